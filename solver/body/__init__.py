@@ -1,0 +1,1 @@
+"""The 24-joint body that everything is fitted to."""

@@ -1,0 +1,1 @@
+"""Outliers and gaps in marker trajectories."""

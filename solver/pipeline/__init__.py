@@ -1,0 +1,1 @@
+"""Stages as data, the store of their results, and the session folder."""

@@ -1,0 +1,1 @@
+"""Fitting the body to the markers: energies and methods."""

@@ -1,0 +1,1 @@
+"""Passive Qt views: each takes plain data and emits signals."""
