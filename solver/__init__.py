@@ -2,3 +2,5 @@
 
 Headless: never imports Qt, VTK, ``app`` or ``widgets``.
 """
+
+__version__ = "0.1.0"

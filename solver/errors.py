@@ -26,6 +26,10 @@ class InputError(MarkerscopeError):
         place = f"{self.where}: " if self.where else ""
         super().__init__(f"{place}{what}{f'; {remedy}' if remedy else ''}.")
 
+    def __reduce__(self) -> tuple[type, tuple[str, str | None, str]]:
+        """Travel from a worker process whole."""
+        return type(self), (self.what, self.where, self.remedy)
+
 
 class Cancelled(MarkerscopeError):
     """The user stopped the work; nothing was written."""

@@ -1,0 +1,122 @@
+"""What the user asks of one solve, and what comes back: the command line and the window speak through these."""
+
+from __future__ import annotations
+
+import math
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from solver.errors import InputError
+
+Up = Literal["x", "y", "z"]
+Units = Literal["m", "cm", "mm"]
+Method = Literal["bundle"]
+Convention = Literal["opensim", "isb", "gait2392", "visual3d", "plugin-gait"]
+
+
+@dataclass(frozen=True)
+class SolveRequest:
+    """One solve. None means: as the session has it, else found from the data, else the documented default.
+
+    Attributes
+    ----------
+    markers : marker file, or a session's folder (whose inputs and settings are then the start)
+    out : folder for the results; a session may leave it out, its own folder is used then
+    video : video of the same movement
+    prior : poses reconstructed from the video by another program, instead of the embedded network's
+    camera : result folder of another trial of the same session, to take the camera from
+    offset : s, what to add to the video's time to have the marker file's
+    rate_ratio : true frame rate of the video over the one that its file states
+    up : vertical axis of the marker file
+    units : length unit of the marker file
+    subject : whose markers to take where a file holds several people's
+    marker_rate : Hz, frame rate of the marker file where it does not say
+    range : (start, stop) s in the marker file's clock, either may be None
+    method : how the body is fitted
+    seed : of every random choice
+    body : a user's own SMPL-layout model instead of the embedded body
+    convention : names and signs of the angles
+    """
+
+    markers: Path
+    out: Path | None = None
+    video: Path | None = None
+    prior: Path | None = None
+    camera: Path | None = None
+    offset: float | None = None
+    rate_ratio: float | None = None
+    up: Up | None = None
+    units: Units | None = None
+    subject: str | None = None
+    marker_rate: float | None = None
+    range: tuple[float | None, float | None] | None = None
+    method: Method | None = None
+    seed: int | None = None
+    body: Path | None = None
+    convention: Convention | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse values that no data can make sense of."""
+        for name, literal in (("up", Up), ("units", Units), ("method", Method), ("convention", Convention)):
+            value, choices = getattr(self, name), typing.get_args(literal)
+            if value is not None and value not in choices:
+                raise InputError(f'is "{value}"', option(name), f"use {' or '.join(choices)}")
+        for name in ("offset", "rate_ratio", "marker_rate"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise InputError(f"is {value}", option(name), "give a finite number")
+        for name in ("rate_ratio", "marker_rate"):
+            value = getattr(self, name)
+            if value is not None and value <= 0:
+                raise InputError(f"is {value:g}", option(name), "give a number above 0")
+        if self.seed is not None and self.seed < 0:
+            raise InputError(f"is {self.seed}", option("seed"), "give 0 or a positive whole number")
+        if self.range is not None:
+            _check_range(*self.range)
+
+
+@dataclass(frozen=True)
+class SolveOutcome:
+    """What one solve found and wrote.
+
+    Attributes
+    ----------
+    out : folder that holds the results
+    summary : what ``--json`` prints: stage times in seconds, energies, confidence... (plain JSON values)
+    lines : the same for a person, one sentence each
+    warnings : what the user should doubt, one sentence each
+    """
+
+    out: Path
+    summary: Mapping[str, Any]
+    lines: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = field(default=())
+
+
+def option(name: str) -> str:
+    """The command-line spelling of a field, for messages."""
+    return f"--{name.replace('_', '-')}"
+
+
+def parse_range(text: str) -> tuple[float | None, float | None]:
+    """``A:B`` in seconds, either end may be left out: ``2.5:10``, ``:10``, ``2.5:``."""
+    start, colon, stop = text.partition(":")
+    try:
+        if not colon:
+            raise ValueError(text)
+        ends = tuple(float(end) if end.strip() else None for end in (start, stop))
+    except ValueError as error:
+        raise InputError(f'is "{text}"', "--range", "give A:B in seconds, for example 2.5:10") from error
+    _check_range(*ends)
+    return ends[0], ends[1]
+
+
+def _check_range(start: float | None, stop: float | None) -> None:
+    for end in (start, stop):
+        if end is not None and not math.isfinite(end):
+            raise InputError(f"has an end at {end}", "--range", "give finite seconds, or leave the end out")
+    if start is not None and stop is not None and stop <= start:
+        raise InputError(f"ends at {stop:g} s and starts at {start:g} s", "--range", "give the earlier time first")

@@ -1,0 +1,169 @@
+"""The session: a folder with ``session.toml`` (inputs, settings, edits) and ``results/``."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from solver import __version__
+from solver.errors import InputError
+from solver.io.atomic import make_folder, write_text_atomic
+from solver.pipeline.digest import DigestCache
+from solver.pipeline.settings import from_table, to_table
+from solver.pipeline.stage import Source, Stage
+from solver.pipeline.store import Store
+
+SCHEMA = 1
+FILE_NAME = "session.toml"
+SUFFIX = ".markerscope"
+_START_AGAIN = "correct it, or start again from the markers"
+
+
+@dataclass(frozen=True)
+class InputFile:
+    """A file the session was made from: where it lies and what it held (SHA-256)."""
+
+    path: Path
+    digest: str = ""
+
+
+@dataclass(frozen=True)
+class Session:
+    """What a session file says.
+
+    Attributes
+    ----------
+    folder : the session's folder, absolute
+    inputs : files by the name of the graph's source; one that is not there was not given
+    settings : tables by stage
+    edits : what the user decided by hand, tables by stage, laid over ``settings``
+    """
+
+    folder: Path
+    inputs: Mapping[str, InputFile] = field(default_factory=dict)
+    settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    edits: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    @property
+    def store(self) -> Store:
+        """The session's results."""
+        return Store(self.folder / "results")
+
+    @property
+    def digests(self) -> DigestCache:
+        """The digests of the session's inputs, remembered beside its results."""
+        return DigestCache(self.folder / "results" / "digests.json")
+
+    def with_settings(self, settings: Mapping[str, Any]) -> Session:
+        """The same session with the settings of some stages replaced by these dataclasses."""
+        return replace(self, settings={**self.settings, **{name: to_table(value) for name, value in settings.items()}})
+
+    def stage_settings(self, graph: Sequence[Stage]) -> dict[str, Any]:
+        """The settings dataclass of every stage, edits included."""
+        known = {stage.name for stage in graph}
+        where = self.folder / FILE_NAME
+        for name in (*self.settings, *self.edits):
+            if name not in known:
+                raise InputError(
+                    f'settings for an unknown stage "{name}"', where, f"use one of: {', '.join(sorted(known))}"
+                )
+        tables = {name: {**self.settings.get(name, {}), **self.edits.get(name, {})} for name in known}
+        return {stage.name: from_table(stage.settings, tables[stage.name], f"{where}, {stage.name}") for stage in graph}
+
+    def sources(self, names: Sequence[str]) -> dict[str, Source]:
+        """The inputs as sources of the graph, read as they are now; one that was not given is None."""
+        cache = self.digests
+        found = {}
+        for name in names:
+            given = self.inputs.get(name)
+            if given is not None and not given.path.is_file():
+                raise InputError(
+                    f"the {name} file of {self.folder / FILE_NAME} is not there any more",
+                    given.path,
+                    "move it back, or correct its path in that file",
+                )
+            found[name] = Source.file(given.path if given else None, cache)
+        cache.save()
+        return found
+
+
+def session_folder(path: str | Path) -> Path | None:
+    """The session that a path means (its folder, or the file in it), or None where it means none."""
+    path = Path(path)
+    if path.name == FILE_NAME and path.is_file():
+        return path.absolute().parent
+    if path.is_dir() and (path / FILE_NAME).is_file():
+        return path.absolute()
+    return None
+
+
+def save_session(session: Session) -> None:
+    """Write ``session.toml``, whole or not at all."""
+    folder = make_folder(session.folder)
+    inputs = {
+        name: {"path": _relative(file.path, folder), "sha256": file.digest} for name, file in session.inputs.items()
+    }
+    content = {
+        "schema": SCHEMA,
+        "program": f"markerscope {__version__}",
+        "inputs": inputs,
+        "settings": {name: dict(table) for name, table in session.settings.items()},
+        "edits": {name: dict(table) for name, table in session.edits.items()},
+    }
+    write_text_atomic(folder / FILE_NAME, tomli_w.dumps(content))
+
+
+def load_session(path: str | Path) -> Session:
+    """Read a session from its folder or its file.
+
+    Raises
+    ------
+    InputError : there is none, it is damaged, or a later version of the program wrote it
+    """
+    folder = session_folder(path)
+    if folder is None:
+        raise InputError(f"is no session: there is no {FILE_NAME} in it", path, "name the folder that holds one")
+    file = folder / FILE_NAME
+    try:
+        content = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}", file, "check its permissions") from error
+    except ValueError as error:
+        raise InputError(f"is not a session file: {error}", file, _START_AGAIN) from error
+    schema = content.get("schema")
+    if not isinstance(schema, int) or schema < 1:
+        raise InputError("does not say which schema it has", file, "start again from the markers")
+    if schema > SCHEMA:
+        program = content.get("program", "a later version")
+        raise InputError(f"was written by {program}, which this version cannot read", file, "update Markerscope")
+    tables = {name: _tables(content.get(name, {}), name, file) for name in ("inputs", "settings", "edits")}
+    inputs = {name: _input_file(table, name, folder, file) for name, table in tables["inputs"].items()}
+    return Session(folder, inputs, tables["settings"], tables["edits"])
+
+
+def _tables(value: Any, name: str, file: Path) -> dict[str, dict[str, Any]]:
+    if not (isinstance(value, dict) and all(isinstance(table, dict) for table in value.values())):
+        raise InputError(f"[{name}] does not hold tables", file, _START_AGAIN)
+    return value
+
+
+def _input_file(table: Mapping[str, Any], name: str, folder: Path, file: Path) -> InputFile:
+    path, digest = table.get("path"), table.get("sha256", "")
+    if not (isinstance(path, str) and path and isinstance(digest, str)):
+        raise InputError(f"[inputs.{name}] has no path", file, "add it, or start again from the markers")
+    return InputFile(Path(os.path.normpath(folder / path)), digest)
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """The path from the folder, with forward slashes, so that both can move together and to another system."""
+    absolute = path.absolute()
+    try:
+        return Path(os.path.relpath(absolute, folder.absolute())).as_posix()
+    except ValueError:  # Windows: another drive
+        return absolute.as_posix()

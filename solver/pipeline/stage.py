@@ -1,0 +1,265 @@
+"""Stages as data, and the runner that computes only what the store does not have."""
+
+from __future__ import annotations
+
+import graphlib
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from solver.errors import Cancelled
+from solver.pipeline.digest import DigestCache, canonical, file_digest, result_key
+from solver.pipeline.store import Absent, Store
+from solver.progress import Progress, part_of, silent
+
+State = Literal["cached", "stale", "not run", "running", "failed"]
+
+
+@dataclass(frozen=True)
+class NoSettings:
+    """For a stage that has nothing to set."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step of the work: a pure function with named inputs.
+
+    Attributes
+    ----------
+    name : what it is called in files, messages and as an input of others
+    version : to be raised when the same settings give another result
+    settings : frozen dataclass type of its settings; its defaults are the stage's
+    inputs : names of the stages and sources it is computed from
+    run : ``(inputs by name, settings, progress) -> result``; a source arrives as its path (or value)
+    result : type of the result, a frozen dataclass or an annotation such as ``Landmarks | None``
+    headline : one line about a result
+    cost : how long it takes beside the other stages, in any unit; only the progress bar believes it
+    """
+
+    name: str
+    version: int
+    settings: type
+    inputs: tuple[str, ...]
+    run: Callable[[Mapping[str, Any], Any, Progress], Any]
+    result: Any
+    headline: Callable[[Any], str] = lambda result: ""
+    cost: float = 1.0
+
+
+@dataclass(frozen=True)
+class Source:
+    """Something given from outside: a file (or None where the user has none), known by what it holds."""
+
+    value: Any
+    digest: str
+
+    @staticmethod
+    def file(path: str | Path | None, cache: DigestCache | None = None) -> Source:
+        """A file as a source; its name and place do not matter to the results."""
+        if path is None:
+            return Source(None, "none")
+        return Source(Path(path), file_digest(path) if cache is None else cache.digest(path))
+
+
+@dataclass(frozen=True)
+class Event:
+    """A stage has begun or ended; ``text`` is its headline, or why it failed."""
+
+    stage: str
+    state: State
+    key: str
+    seconds: float = 0.0
+    text: str = ""
+    computed: bool = False
+
+
+OnEvent = Callable[[Event], None]
+
+
+def ignore(event: Event) -> None:
+    """Listen to no events."""
+
+
+@dataclass
+class GraphRun:
+    """What a run of the graph found; results are loaded from the store when first asked for.
+
+    Attributes
+    ----------
+    keys : key of every stage
+    events : the last event of every stage that was wanted: cached or computed, seconds, headline
+    """
+
+    keys: Mapping[str, str]
+    events: Mapping[str, Event]
+    _value: Callable[[str], Any] = field(repr=False)
+
+    def __getitem__(self, stage: str) -> Any:
+        return self._value(stage)
+
+    @property
+    def computed(self) -> tuple[str, ...]:
+        """Names of the stages that were not in the store."""
+        return tuple(name for name, event in self.events.items() if event.computed)
+
+
+def stage_keys(graph: Sequence[Stage], sources: Mapping[str, Source], settings: Mapping[str, Any]) -> dict[str, str]:
+    """Key of every stage, in an order in which they can be computed."""
+    stages = {stage.name: stage for stage in graph}
+    if len(stages) < len(graph) or stages.keys() & sources.keys():
+        raise ValueError("two nodes of the graph have the same name")
+    for name in settings.keys() - stages.keys():
+        raise ValueError(f"settings for a stage that the graph does not have: {name}")
+    keys: dict[str, str] = {}
+    depends = {name: [i for i in stage.inputs if i not in sources] for name, stage in stages.items()}
+    for name in graphlib.TopologicalSorter(depends).static_order():
+        if name not in stages:
+            raise ValueError(f"an input that is neither a stage nor a source: {name}")
+        stage = stages[name]
+        inputs = {i: sources[i].digest if i in sources else keys[i] for i in stage.inputs}
+        keys[name] = result_key(name, stage.version, _settings_of(stage, settings), inputs)
+    return keys
+
+
+def stage_states(
+    graph: Sequence[Stage], sources: Mapping[str, Source], settings: Mapping[str, Any], store: Store
+) -> dict[str, State]:
+    """Per stage: *cached*, *stale* (only results of other settings or inputs are there) or *not run*."""
+    states: dict[str, State] = {}
+    for name, key in stage_keys(graph, sources, settings).items():
+        if store.has(name, key):
+            states[name] = "cached"
+        else:
+            states[name] = "stale" if store.list(name) else "not run"
+    return states
+
+
+def run_graph(
+    graph: Sequence[Stage],
+    sources: Mapping[str, Source],
+    settings: Mapping[str, Any],
+    store: Store,
+    until: Collection[str] | None = None,
+    progress: Progress = silent,
+    on_event: OnEvent = ignore,
+) -> GraphRun:
+    """Have the results of the wanted stages in the store, computing only what is not there.
+
+    Parameters
+    ----------
+    graph : the stages, in any order
+    sources : what comes from outside, by name
+    settings : settings of the stages that do not keep their defaults
+    until : the stages whose results are wanted, all by default; what only leads to them is computed if needed
+    progress : told the fraction of the stages that must run, each by its cost
+    on_event : told when a stage begins, ends, fails, or was in the store
+    """
+    keys = stage_keys(graph, sources, settings)
+    runner = _Runner({stage.name: stage for stage in graph}, keys, sources, settings, store, progress, on_event)
+    wanted = [name for name in keys if until is None or name in until]
+    runner.plan(wanted)
+    for name in wanted:
+        runner.ensure(name)
+    progress(1.0, "done")
+    return GraphRun(keys, runner.events, runner.value)
+
+
+class _Runner:
+    """The state of one run: what is in memory, what has happened."""
+
+    def __init__(
+        self,
+        stages: Mapping[str, Stage],
+        keys: Mapping[str, str],
+        sources: Mapping[str, Source],
+        settings: Mapping[str, Any],
+        store: Store,
+        progress: Progress,
+        on_event: OnEvent,
+    ) -> None:
+        self.stages, self.keys, self.sources, self.settings = stages, keys, sources, settings
+        self.store, self.progress, self.on_event = store, progress, on_event
+        self.events: dict[str, Event] = {}
+        self.memory: dict[str, Any] = {}
+        self.shares: dict[str, tuple[float, float]] = {}
+
+    def plan(self, wanted: Sequence[str]) -> None:
+        """Share out the progress bar among the stages that will have to run."""
+        missing: set[str] = set()
+        frontier = list(wanted)
+        while frontier:
+            name = frontier.pop()
+            if name not in missing and name not in self.sources and not self.store.has(name, self.keys[name]):
+                missing.add(name)
+                frontier += self.stages[name].inputs
+        total = sum(self.stages[name].cost for name in missing) or 1.0
+        done = 0.0
+        for name in self.keys:
+            if name in missing:
+                self.shares[name] = (done / total, (done + self.stages[name].cost) / total)
+                done += self.stages[name].cost
+
+    def ensure(self, name: str) -> None:
+        """Have a stage's result in the store."""
+        if name in self.events:
+            return
+        entry = self.store.entry(name, self.keys[name])
+        if entry is None:
+            self._compute(name)
+        else:
+            about = entry.about
+            self._tell(Event(name, "cached", entry.key, about.get("seconds", 0.0), about.get("headline", "")))
+
+    def value(self, name: str) -> Any:
+        """A source's value or a stage's result, computed if the store turns out not to have it whole."""
+        if name in self.sources:
+            return self.sources[name].value
+        if name not in self.memory:
+            self.ensure(name)
+        if name not in self.memory:
+            try:
+                self.memory[name] = self.store.get(name, self.keys[name], self.stages[name].result)
+            except Absent:
+                self.store.discard(name, self.keys[name])
+                self._compute(name)
+        return self.memory[name]
+
+    def _compute(self, name: str) -> None:
+        stage, key = self.stages[name], self.keys[name]
+        inputs = {i: self.value(i) for i in stage.inputs}
+        settings = _settings_of(stage, self.settings)
+        report = part_of(self.progress, *self.shares.get(name, (0.0, 0.0)))
+        self._tell(Event(name, "running", key))
+        report(0.0, name)
+        start = time.perf_counter()
+        try:
+            result = stage.run(inputs, settings, report)
+            seconds = time.perf_counter() - start
+            headline = stage.headline(result)
+            about = {
+                "version": stage.version,
+                "settings": canonical(settings),
+                "inputs": {i: self.sources[i].digest if i in self.sources else self.keys[i] for i in stage.inputs},
+                "seconds": seconds,
+                "headline": headline,
+            }
+            self.store.put(name, key, result, about)
+        except Cancelled:
+            self._tell(Event(name, "not run", key))
+            raise
+        except Exception as error:
+            self._tell(Event(name, "failed", key, text=str(error)))
+            raise
+        self.memory[name] = result
+        self._tell(Event(name, "cached", key, seconds, headline, computed=True))
+        report(1.0, name)
+
+    def _tell(self, event: Event) -> None:
+        self.events[event.stage] = event
+        self.on_event(event)
+
+
+def _settings_of(stage: Stage, settings: Mapping[str, Any]) -> Any:
+    return settings[stage.name] if stage.name in settings else stage.settings()
