@@ -83,6 +83,12 @@ def read_frames(
                 yield i, time, decoder.picture(frame)
 
 
+def announced(path: str | Path) -> tuple[float, int]:
+    """What the container says, at a glance: the mean rate in Hz and the number of frames (0 = unknown)."""
+    with _Decoder(path) as decoder:
+        return decoder.nominal, decoder.announced
+
+
 class FrameReader:
     """Random access to the frames of an indexed video, exact by presentation stamp."""
 
@@ -169,7 +175,8 @@ class _Decoder:
         self._stream = pictures[0]
         self._stream.thread_type = "AUTO"
         rate = self._stream.average_rate or self._stream.guessed_rate
-        self._nominal = float(rate) if rate else 30.0
+        self.nominal = float(rate) if rate else 30.0
+        self.announced = int(self._stream.frames)
         self._damaged = 0
         self._restamped = 0
         self._size = (0, 0)
@@ -193,7 +200,7 @@ class _Decoder:
 
     def __iter__(self) -> Iterator[tuple[VideoFrame, float, int]]:
         first: int | None = None
-        time = -1.0 / self._nominal
+        time = -1.0 / self.nominal
         unit = float(self._stream.time_base or 0)
         for frame in self._raw():
             pts, previous = frame.pts, time
@@ -201,7 +208,7 @@ class _Decoder:
                 first = 0 if pts is None else pts
             time = -np.inf if pts is None else (pts - first) * unit
             if time <= previous:
-                time, pts = previous + 1.0 / self._nominal, NO_STAMP
+                time, pts = previous + 1.0 / self.nominal, NO_STAMP
                 self._restamped += 1
             self._measure(frame)
             yield frame, time, NO_STAMP if pts is None else pts
@@ -219,10 +226,10 @@ class _Decoder:
         if self._damaged:
             notes.append(f"{self._damaged} damaged or cut-off parts of the video were left out.")
         if self._restamped:
-            notes.append(f"{self._restamped} frames without a usable time stamp were spaced at {self._nominal:g} Hz.")
-        if self._stream.frames and self._stream.frames != len(time):
-            notes.append(f"The file announces {self._stream.frames} frames and holds {len(time)}.")
-        rate = 1.0 / float(np.median(np.diff(time))) if len(time) > 1 else self._nominal
+            notes.append(f"{self._restamped} frames without a usable time stamp were spaced at {self.nominal:g} Hz.")
+        if self.announced and self.announced != len(time):
+            notes.append(f"The file announces {self.announced} frames and holds {len(time)}.")
+        rate = 1.0 / float(np.median(np.diff(time))) if len(time) > 1 else self.nominal
         codec = self._stream.codec_context.name
         return VideoIndex(time, pts, self._size, self._upright.turned, rate, codec, tuple(notes), self.source)
 
