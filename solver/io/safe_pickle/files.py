@@ -6,6 +6,8 @@ import bz2
 import io
 import lzma
 import math
+import struct
+import tokenize
 import zipfile
 import zlib
 from pathlib import Path
@@ -66,7 +68,7 @@ def load_untrusted(path: str | Path) -> Any:
         ) from None
     except Damaged as error:
         raise InputError(str(error), path, "write or copy it again") from None
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError):
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, ValueError, EOFError, struct.error):
         raise InputError("its contents are damaged or cut short", path, "write or copy it again") from None
 
 
@@ -123,7 +125,7 @@ def _read_npy(data: bytes, budget: Budget, depth: int = 0) -> Any:
         version = np.lib.format.read_magic(stream)
         read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, fortran, dtype = read_header(stream)
-    except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError):
+    except (ValueError, TypeError, KeyError, SyntaxError, RecursionError, MemoryError, tokenize.TokenError):
         raise Damaged("its array header is damaged") from None
     context = Context(stream, budget, depth=depth)
     if dtype.hasobject:
