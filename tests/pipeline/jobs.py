@@ -1,0 +1,60 @@
+"""What the worker tests run in a child process: importable by name, as a spawned process needs it."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+from solver.errors import InputError
+from solver.pipeline.stage import Event, NoSettings, Source, Stage, run_graph
+from solver.pipeline.store import Store
+
+
+def add(a: int, b: int, *, progress: Any, on_event: Any) -> int:
+    progress(0.5, "adding")
+    on_event(Event("add", "running", "k"))
+    progress(1.0, "added")
+    return a + b
+
+
+def refuse(*, progress: Any, on_event: Any) -> None:
+    raise InputError("has no markers", "a.trc", "export it again")
+
+
+def stumble(*, progress: Any, on_event: Any) -> None:
+    raise ZeroDivisionError("of all things")
+
+
+def die(*, progress: Any, on_event: Any) -> None:
+    os._exit(9)
+
+
+def unsendable(*, progress: Any, on_event: Any) -> Any:
+    return lambda: None
+
+
+def quick(inputs: Any, settings: Any, progress: Any) -> int:
+    return 1
+
+
+def endless(inputs: Any, settings: Any, progress: Any) -> int:
+    while True:
+        progress(0.5, "waiting to be ended")
+        time.sleep(0.01)
+
+
+GRAPH = (
+    Stage("quick", 1, NoSettings, ("file",), quick, int),
+    Stage("endless", 1, NoSettings, ("quick",), endless, int),
+)
+
+
+def graph_that_hangs(root: Path, *, progress: Any, on_event: Any) -> None:
+    store = Store(root)
+    run_graph(GRAPH, {"file": Source.file(None)}, {}, store, until=["quick"], on_event=on_event)
+    half = store.root / "endless" / f".tmp-{os.getpid()}-half"
+    half.mkdir(parents=True)
+    (half / "arrays.npz").write_bytes(b"half")
+    run_graph(GRAPH, {"file": Source.file(None)}, {}, store, progress=progress, on_event=on_event)
