@@ -1,0 +1,217 @@
+"""The default method: joint bundle adjustment of pose, shape, marker placement and camera.
+
+Every hypothesis of where the markers sit is relaxed on a few keyframes; the best few go on with their markers free to
+slide to their true places, first coarsely, then finely; the least total energy wins, and its margin over the next
+different answer is the confidence.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.body.model import Body
+from solver.localize import Hypothesis
+from solver.progress import Progress, silent
+from solver.solve.kinematics import Points, Pose, blended_turn, forward, place_points
+from solver.solve.placement import Skin
+from solver.solve.refine import carried_over
+from solver.solve.problem import Camera, Energies, Observations, Problem, State, Surface, Weights
+
+NOWHERE = Points(np.zeros((0, 3)), np.zeros((0, 3, 0)), np.zeros((0, 24)))
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One stretch of the descent: how coarse markers are taken, how often they choose a new place, how many steps."""
+
+    marker: float
+    kernel: float
+    steps: int
+    reassign: bool = False
+    free_placement: bool = False
+    free_shape: bool = True
+
+
+COARSE = (
+    Phase(0.04, 0.16, 3, free_shape=False),
+    Phase(0.03, 0.12, 3, reassign=True),
+    Phase(0.025, 0.10, 3, reassign=True),
+)
+FINE = (
+    Phase(0.02, 0.08, 3, reassign=True, free_placement=True),
+    Phase(0.015, 0.06, 4, free_placement=True),
+    Phase(0.01, 0.04, 6, free_placement=True),
+)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A hypothesis after relaxation.
+
+    Attributes
+    ----------
+    start : the hypothesis it began as
+    state : pose of the keyframes, marker placement, camera
+    surface : the skin below each marker
+    energies : its cost by kind of evidence, per frame
+    trace : total energy after every step
+    """
+
+    start: Hypothesis
+    state: State
+    surface: Surface
+    energies: Energies
+    trace: tuple[float, ...]
+
+
+def start_state(problem: Problem, guess: Hypothesis, weights: Weights, camera: Camera | None = None) -> tuple[State, Surface]:
+    """The video's body laid over the markers as a hypothesis says."""
+    betas = np.zeros(problem.body.shape_count)
+    skin = Skin(problem.body, betas)
+    placement, surface = skin.on_vertices(guess.vertex, weights.offset)
+    rotations = problem.seen.prior.copy()
+    rotations[:, 0] = guess.R_lab_cam @ rotations[:, 0]
+    pose = Pose(rotations, guess.trans - problem.body.joints(betas)[0], betas)
+    if camera is None:
+        camera = locate_camera(problem, pose, guess.R_lab_cam, weights)
+    return State(pose, placement, camera), surface
+
+
+def locate_camera(problem: Problem, pose: Pose, turn: np.ndarray, weights: Weights) -> Camera:
+    """A camera of known orientation and guessed focal length, placed so that the posed body falls on its landmarks."""
+    centre = problem.seen.lab_centre
+    focal = weights.focal_guess * max(max(problem.seen.image_size), 1)
+    camera = Camera(turn, np.array([0.0, 0, 4.0]), centre, focal)
+    if not problem.in_image.any():
+        return camera
+    points = place_points(problem.landmarks, forward(problem.body, pose), pose.betas)
+    local = ((points - centre) @ turn)[problem.in_image]
+    ray = (problem.pixels[problem.in_image] - np.array(problem.seen.image_size) / 2) / focal
+    # x + tx = u (z + tz), likewise y: linear in the shift
+    a = np.zeros((2 * len(local), 3))
+    a[0::2, 0] = a[1::2, 1] = 1
+    a[0::2, 2], a[1::2, 2] = -ray[:, 0], -ray[:, 1]
+    b = (ray * local[:, 2:] - local[:, :2]).ravel()
+    shift = np.linalg.lstsq(a, b, rcond=None)[0]
+    return replace(camera, shift=shift if shift[2] > 0.5 else camera.shift)
+
+
+def descend(
+    problem: Problem, state: State, surface: Surface, phases: tuple[Phase, ...], base: Weights
+) -> tuple[State, Surface, tuple[float, ...]]:
+    """Damped Gauss-Newton through the given phases; each step is kept only if it costs less."""
+    trace: list[float] = []
+    for phase in phases:
+        weights = phase_weights(base, phase)
+        if phase.reassign:
+            state, surface = reassign(problem, state, weights)
+        damping, cost = 1e-3, problem.energies(state, weights, surface).total
+        for _ in range(phase.steps):
+            for _attempt in range(4):
+                trial = problem.step(state, weights, surface, damping)
+                trial_cost = problem.energies(trial, weights, surface).total
+                if trial_cost < cost:
+                    break
+                damping *= 10
+            else:
+                break
+            gain = (cost - trial_cost) / cost
+            state, cost, damping = trial, trial_cost, max(damping * 0.3, 1e-6)
+            if phase.free_placement:
+                state, surface = reattach(problem.body, state)
+                cost = problem.energies(state, weights, surface).total
+            trace.append(cost)
+            if gain < 1e-4:
+                break
+    return state, surface, tuple(trace)
+
+
+def phase_weights(base: Weights, phase: Phase) -> Weights:
+    """The weights of one phase."""
+    return replace(
+        base,
+        marker=phase.marker,
+        marker_kernel=phase.kernel,
+        free_placement=phase.free_placement,
+        free_shape=base.free_shape and phase.free_shape,
+    )
+
+
+def reattach(body: Body, state: State) -> tuple[State, Surface]:
+    """The same placement, riding on the skin that is below it now."""
+    skin = Skin(body, state.pose.betas)
+    placement, surface = skin.attach(state.placement.shaped(state.pose.betas))
+    return replace(state, placement=placement), surface
+
+
+def reassign(problem: Problem, state: State, weights: Weights) -> tuple[State, Surface]:
+    """Each marker moved to the place on the skin that its whole trajectory fits best, given the poses.
+
+    In every frame the marker is carried back to the rest body as if it rode on a vertex; the vertex whose carried
+    marker strays least from its skin, over all frames together, takes it.
+    """
+    body, betas = problem.body, state.pose.betas
+    skin = Skin(body, betas)
+    index = np.intersect1d(body.lod_index, skin.index)
+    candidates = Points(
+        skin.surface[index] + weights.offset * skin.normal[index] - body.shape_dirs[index] @ betas,
+        body.shape_dirs[index],
+        body.weights[index],
+    )
+    links = forward(body, state.pose)
+    placed = place_points(candidates, links, betas)  # (N, V, 3)
+    count = np.maximum(problem.present.sum(axis=0), 1)
+    flat = placed.transpose(1, 0, 2).reshape(len(index), -1)
+    square = np.einsum("nvk,nvk->vn", placed, placed) @ problem.present
+    product = flat @ problem.target.transpose(0, 2, 1).reshape(flat.shape[1], -1)
+    distance = square - 2 * product + np.einsum("nmk,nmk->m", problem.target, problem.target)
+    best = distance.argmin(axis=0)
+    chosen = candidates.take(best)
+    # from the vertex to the mean place of the marker in that vertex's own moving frame
+    turn = blended_turn(chosen, links)
+    residual = problem.target - placed[:, best]
+    carried = np.einsum("nmji,nmj->nmi", turn, residual) * problem.present[..., None]
+    offset = np.clip(carried.sum(axis=0) / count[:, None], -0.03, 0.03)
+    normal = skin.normal[index[best]]
+    offset -= np.einsum("mk,mk->m", offset, normal)[:, None] * normal
+    placement, surface = skin.attach(chosen.shaped(betas) + offset)
+    return replace(state, placement=placement), surface
+
+
+def relax(
+    body: Body, seen: Observations, landmarks: Points, guesses: tuple[Hypothesis, ...], few: np.ndarray, many: np.ndarray,
+    base: Weights, *, keep: int = 4, camera: Camera | None = None, progress: Progress = silent,
+) -> tuple[Fit, ...]:
+    """Every hypothesis relaxed coarsely on few keyframes, the best ``keep`` finely on many.
+
+    Parameters
+    ----------
+    seen : all T frames
+    guesses : with ``trans`` for the frames ``few``
+    few, many : ascending frame numbers of the coarse and the fine keyframes
+
+    Returns
+    -------
+    The refined fits, least energy first, then those that were left behind, likewise
+    """
+    problem = Problem(body, seen.at(few), landmarks)
+    coarse = []
+    judge = phase_weights(base, COARSE[-1])
+    for i, guess in enumerate(guesses):
+        progress(0.6 * i / len(guesses), f"hypothesis {i + 1} of {len(guesses)}")
+        state, surface = start_state(problem, guess, base, camera)
+        state, surface, trace = descend(problem, state, surface, COARSE, base)
+        coarse.append(Fit(guess, state, surface, problem.energies(state, judge, surface), trace))
+    coarse.sort(key=lambda fit: fit.energies.total)
+    judge = phase_weights(base, FINE[-1])
+    whole = Problem(body, seen.at(many), landmarks)
+    fine = []
+    for i, fit in enumerate(coarse[:keep]):
+        progress(0.6 + 0.4 * i / keep, f"refining hypothesis {i + 1} of {min(keep, len(coarse))}")
+        pose = carried_over(body, seen, few, fit.state).at(many)
+        state, surface, trace = descend(whole, replace(fit.state, pose=pose), fit.surface, FINE, base)
+        fine.append(Fit(fit.start, state, surface, whole.energies(state, judge, surface), fit.trace + trace))
+    fine.sort(key=lambda fit: fit.energies.total)
+    return tuple(fine) + tuple(coarse[keep:])

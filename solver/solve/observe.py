@@ -1,0 +1,61 @@
+"""Markers, the video's pose and its landmarks brought onto the markers' clock."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.body.model import Body
+from solver.markers import Markers
+from solver.prior import PosePrior
+from solver.rotations import slerp
+from solver.solve.kinematics import Points
+from solver.solve.problem import Observations
+from solver.video.landmarks import Landmarks
+from solver.video.lift import landmark_points
+
+_LONGEST_BRIDGE_S = 0.1
+"""Landmarks further apart than this are not interpolated between."""
+
+
+def observe(
+    markers: Markers, prior: PosePrior, landmarks: Landmarks | None, body: Body, offset: float, rate_ratio: float
+) -> tuple[Observations, Points]:
+    """What a fit is given.
+
+    Parameters
+    ----------
+    offset, rate_ratio : marker time = rate_ratio * video time + offset, s
+
+    Returns
+    -------
+    Observations of all T frames, and the (L) body points that the landmarks show
+    """
+    wanted = (markers.time - offset) / rate_ratio
+    rotations = slerp(prior.rotations, prior.time, wanted)
+    tracked = _covered(prior.time, prior.tracked, wanted)
+    if landmarks is None:
+        none = np.zeros((len(wanted), 0))
+        points = Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
+        return Observations(markers.positions, rotations, tracked, none[..., None].repeat(2, -1), none, (0, 0)), points
+    points, column = landmark_points(body)
+    seen = _covered(landmarks.time, landmarks.tracked, wanted)
+    used = landmarks.tracked
+    image = _at(landmarks.time[used], landmarks.image[used][:, column], wanted)
+    visibility = np.clip(_at(landmarks.time[used], landmarks.visibility[used][:, column], wanted), 0, 1)
+    image[~seen] = np.nan
+    return Observations(markers.positions, rotations, tracked, image, visibility, landmarks.image_size), points
+
+
+def _covered(times: np.ndarray, tracked: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """(T,) True where both neighbouring video frames are tracked and near."""
+    right = np.clip(np.searchsorted(times, wanted), 0, len(times) - 1)
+    left = np.clip(right - 1, 0, None)
+    left = np.where(np.abs(times[right] - wanted) < 1e-6, right, left)
+    near = np.minimum(np.abs(times[left] - wanted), np.abs(times[right] - wanted)) <= _LONGEST_BRIDGE_S
+    return tracked[left] & tracked[right] & near
+
+
+def _at(times: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Linear interpolation over time of (F, ...) values."""
+    flat = values.reshape(len(values), -1)
+    return np.stack([np.interp(wanted, times, column) for column in flat.T], axis=1).reshape(len(wanted), *values.shape[1:])

@@ -1,0 +1,57 @@
+"""Where a marker sits on the rest body: what skin it rides on, and the surface it is held to."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solver.body.model import Body, vertex_normals
+from solver.solve.kinematics import Points
+from solver.solve.problem import Surface
+
+_NEIGHBOURS = 4
+
+
+class Skin:
+    """The shaped rest surface of a body, as far as markers can sit on it.
+
+    Parameters
+    ----------
+    body : the body
+    betas : (S,) its shape
+    """
+
+    def __init__(self, body: Body, betas: np.ndarray) -> None:
+        self.body, self.betas = body, betas
+        self.index = np.flatnonzero(body.marker_mask)
+        self.surface = body.surface(betas)
+        self.normal = vertex_normals(self.surface, body.faces)
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.surface[self.index])
+
+    def on_vertices(self, vertices: np.ndarray, height: float) -> tuple[Points, Surface]:
+        """Markers (M) set ``height`` m above given vertices."""
+        placed = self.surface[vertices] + height * self.normal[vertices]
+        rest = placed - self.body.shape_dirs[vertices] @ self.betas
+        points = Points(rest, self.body.shape_dirs[vertices], self.body.weights[vertices])
+        return points, Surface(self.surface[vertices], self.normal[vertices])
+
+    def attach(self, placed: np.ndarray) -> tuple[Points, Surface]:
+        """Markers at ``placed`` (M, 3) m on the shaped rest body, riding on the skin below them."""
+        distance, near = self._tree.query(placed, k=_NEIGHBOURS)
+        share = 1 / np.maximum(distance, 1e-4) ** 2
+        share /= share.sum(axis=1, keepdims=True)
+        near = self.index[near]
+        blend = lambda values: np.einsum("mk,mk...->m...", share, values[near])  # noqa: E731
+        dirs = blend(self.body.shape_dirs)
+        normal = blend(self.normal)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+        return Points(placed - dirs @ self.betas, dirs, blend(self.body.weights)), Surface(blend(self.surface), normal)
+
+    def nearest_vertex(self, placed: np.ndarray) -> np.ndarray:
+        """(M,) vertex index below each marker."""
+        return self.index[self._tree.query(placed)[1]]

@@ -1,0 +1,153 @@
+"""What the solve stages leave behind: everything a view can draw, as plain arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class CameraResult:
+    """A fitted pinhole camera, lab frame.
+
+    Attributes
+    ----------
+    R_lab_cam : (3, 3) turns camera axes (x right, y down, z away) into the internal lab frame
+    position : (3,) m, lab frame
+    focal : px, of square pixels; the principal point is the middle of the image
+    image_size : (width, height) px, (0, 0) if there were no landmarks to see it by
+    reprojection_px : median distance of the landmarks from where the body puts them; NaN without landmarks
+    """
+
+    R_lab_cam: np.ndarray
+    position: np.ndarray
+    focal: float
+    image_size: tuple[int, int]
+    reprojection_px: float
+
+
+@dataclass(frozen=True)
+class Localization:
+    """Where the markers may sit, before any pose is changed.
+
+    Attributes
+    ----------
+    markers : (U,) index of the markers in use; others were left out or seen too rarely
+    few, many : keyframes (frame numbers) of the coarse and the fine solve
+    vertex : (H, U) vertex of each marker in each hypothesis, cheapest first
+    bone : (H, U) bone that vertex follows most
+    R_lab_cam : (H, 3, 3) camera to lab
+    trans : (H, N, 3) m, shift of the video's body in each of the few keyframes
+    cost_mm : (H,) root mean square distance of the markers to their vertices
+    start : where each hypothesis was started: a bone, or "whole body"
+    yaw_deg : (H,) the yaw it was started from
+    """
+
+    markers: np.ndarray
+    few: np.ndarray
+    many: np.ndarray
+    vertex: np.ndarray
+    bone: np.ndarray
+    R_lab_cam: np.ndarray
+    trans: np.ndarray
+    cost_mm: np.ndarray
+    start: tuple[str, ...]
+    yaw_deg: np.ndarray
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A hypothesis after bundle adjustment.
+
+    Attributes
+    ----------
+    hypothesis : its row in the localization
+    refined : False if it was left behind after the coarse phase
+    energies : cost per frame by kind of evidence (markers, prior, anatomical, image, shape, placement)
+    energy : their sum; comparable only among refined, or only among unrefined, candidates
+    bone : (U,) bone of each marker
+    vertex : (U,) nearest vertex of each marker
+    part : the bones that carry markers, in words
+    heading_deg : which way the camera looks in the lab, about the vertical
+    camera : as fitted
+    rest, dirs, weights : placement of the markers: (U, 3) m on the mean rest body, (U, 3, S), (U, 24)
+    surface, normal : (U, 3) m and (U, 3), the rest skin below each marker
+    betas : (S,) shape, bone lengths last
+    rotations, trans : pose of the keyframes, lab frame
+    trace : total energy after each step
+    """
+
+    hypothesis: int
+    refined: bool
+    energies: dict[str, float]
+    energy: float
+    bone: np.ndarray
+    vertex: np.ndarray
+    part: str
+    heading_deg: float
+    camera: CameraResult
+    rest: np.ndarray
+    dirs: np.ndarray
+    weights: np.ndarray
+    surface: np.ndarray
+    normal: np.ndarray
+    betas: np.ndarray
+    rotations: np.ndarray
+    trans: np.ndarray
+    trace: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Orientation:
+    """The hypotheses ranked after bundle adjustment, and how sure the first is.
+
+    Attributes
+    ----------
+    candidates : refined ones first, least energy first
+    margin : energy of the best *different* answer over the best; 1 = they tie, infinite = there is no other
+    runner_up : its row in ``candidates``, -1 if there is none
+    confidence : 0..1
+    warnings : what is ambiguous, in words
+    """
+
+    candidates: tuple[Candidate, ...]
+    margin: float
+    runner_up: int
+    confidence: float
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class FittedMotion:
+    """The body fitted to every frame.
+
+    Attributes
+    ----------
+    time : (T,) s, the marker file's clock
+    rotations : (T, 24, 3, 3) root in the internal lab frame (z up), others relative to the parent
+    trans : (T, 3) m
+    betas : (S,) shape, bone lengths last
+    joints : (T, 24, 3) m
+    marker_joint, marker_vertex : (M,) bone and nearest vertex of each marker, -1 where it was not used
+    placed : (T, M, 3) m, where the body says each marker is; NaN where it was not used
+    residual : (T, M) m, distance of each marker from there; NaN where lost
+    camera : as fitted
+    chosen : row of the candidate it was refined from
+    confidence : 0..1
+    warnings : in words
+    """
+
+    time: np.ndarray
+    rotations: np.ndarray
+    trans: np.ndarray
+    betas: np.ndarray
+    joints: np.ndarray
+    marker_joint: np.ndarray
+    marker_vertex: np.ndarray
+    placed: np.ndarray
+    residual: np.ndarray
+    camera: CameraResult
+    chosen: int
+    confidence: float
+    warnings: tuple[str, ...]
