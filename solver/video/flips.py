@@ -1,7 +1,7 @@
 """Left and right exchanged by the pose network: found by continuity over time, and mended.
 
-The network sometimes calls the left limb right for a frame or a while. Of all ways to exchange sides frame by frame, the
-one is taken along which the landmarks accelerate least. It has two readings (every frame the other way round is as
+The network sometimes calls the left limb right for a frame or a while. Of all ways to exchange sides frame by frame,
+the one is taken along which the landmarks accelerate least. It has two readings (every frame the other way round is as
 smooth); which is right is told by most frames and by the body: a left knee is on the left of the pelvis, toes and nose
 point where the trunk faces.
 """
@@ -49,9 +49,9 @@ def mend_flips(landmarks: Landmarks) -> tuple[Landmarks, tuple[Flip, ...]]:
             exchanged = _smoothest(path[:, left], path[:, right])
             vote = 1 + _BODY_WEIGHT * _agreement(group, world[rows])
             flipped[rows] = exchanged if vote[~exchanged].sum() >= vote[exchanged].sum() else ~exchanged
-        there, here = np.ix_(flipped, [*left, *right]), np.ix_(flipped, [*right, *left])
+        wrong = np.flatnonzero(flipped)[:, None]
         for values in (image, world, visibility):
-            values[there] = values[here]
+            values[wrong, left + right] = values[wrong, right + left]
         flips += _spans(group, flipped & landmarks.tracked)
     return replace(landmarks, image=image, world=world, visibility=visibility), tuple(flips)
 

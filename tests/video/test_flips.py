@@ -117,7 +117,7 @@ def test_passing_legs_are_not_flips() -> None:
 def test_flips_among_passing_legs_are_found(seed: int) -> None:
     track = walker()
     flipped = spans(len(track.time), np.random.default_rng(seed), 5, 15)
-    truth = {group: flipped for group in EVERY}
+    truth = dict.fromkeys(EVERY, flipped)
     score = f1(truth, found(exchange(track, truth))[1])
     assert score > 0.9, f"F1 {score:.3f}"
 
@@ -125,7 +125,7 @@ def test_flips_among_passing_legs_are_found(seed: int) -> None:
 def test_the_body_outvotes_a_majority_of_exchanged_frames() -> None:
     track = walker()
     flipped = np.arange(len(track.time)) >= 0.35 * len(track.time)
-    truth = {group: flipped for group in EVERY}
+    truth = dict.fromkeys(EVERY, flipped)
     score = f1(truth, found(exchange(track, truth))[1])
     assert score > 0.97, f"F1 {score:.3f}"
 
