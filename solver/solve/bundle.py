@@ -197,21 +197,45 @@ def relax(
     The refined fits, least energy first, then those that were left behind, likewise
     """
     problem = Problem(body, seen.at(few), landmarks)
-    coarse = []
     judge = phase_weights(base, COARSE[-1])
+    pool = []
     for i, guess in enumerate(guesses):
-        progress(0.6 * i / len(guesses), f"hypothesis {i + 1} of {len(guesses)}")
+        progress(0.3 * i / len(guesses), f"hypothesis {i + 1} of {len(guesses)}")
         state, surface = start_state(problem, guess, base, camera)
-        state, surface, trace = descend(problem, state, surface, COARSE, base)
-        coarse.append(Fit(guess, state, surface, problem.energies(state, judge, surface), trace))
-    coarse.sort(key=lambda fit: fit.energies.total)
+        pool.append(_advance(problem, Fit(guess, state, surface, problem.energies(state, judge, surface), ()), COARSE[:1], base, judge))
+    # Poor starts are dropped early; each phase costs as much as all before it.
+    for i, phase in enumerate(COARSE[1:]):
+        pool.sort(key=lambda fit: fit.energies.total)
+        going, left = pool[: max(keep * 2, len(guesses) // 2**(i + 1))], pool[max(keep * 2, len(guesses) // 2**(i + 1)) :]
+        progress(0.3 + 0.15 * i, f"relaxing {len(going)} hypotheses")
+        pool = [_advance(problem, fit, (phase,), base, judge) for fit in going] + left
+    pool.sort(key=lambda fit: fit.energies.total)
+    chosen = _varied(pool, keep)
     judge = phase_weights(base, FINE[-1])
     whole = Problem(body, seen.at(many), landmarks)
     fine = []
-    for i, fit in enumerate(coarse[:keep]):
-        progress(0.6 + 0.4 * i / keep, f"refining hypothesis {i + 1} of {min(keep, len(coarse))}")
+    for i, fit in enumerate(chosen):
+        progress(0.6 + 0.4 * i / len(chosen), f"refining hypothesis {i + 1} of {len(chosen)}")
         pose = carried_over(body, seen, few, fit.state).at(many)
-        state, surface, trace = descend(whole, replace(fit.state, pose=pose), fit.surface, FINE, base)
-        fine.append(Fit(fit.start, state, surface, whole.energies(state, judge, surface), fit.trace + trace))
+        fine.append(_advance(whole, replace(fit, state=replace(fit.state, pose=pose)), FINE, base, judge))
     fine.sort(key=lambda fit: fit.energies.total)
-    return tuple(fine) + tuple(coarse[keep:])
+    return tuple(fine) + tuple(fit for fit in pool if not any(fit is one for one in chosen))
+
+
+def _advance(problem: Problem, fit: Fit, phases: tuple[Phase, ...], base: Weights, judge: Weights) -> Fit:
+    """The same fit after some more phases of descent."""
+    state, surface, trace = descend(problem, fit.state, fit.surface, phases, base)
+    return Fit(fit.start, state, surface, problem.energies(state, judge, surface), fit.trace + trace)
+
+
+def _varied(pool: list[Fit], keep: int) -> list[Fit]:
+    """The best fits, but no more than two that give the markers to nearly the same bones."""
+    chosen: list[Fit] = []
+    for fit in pool:
+        bones = fit.state.placement.weights.argmax(1)
+        alike = sum((bones == one.state.placement.weights.argmax(1)).mean() > 0.8 for one in chosen)
+        if alike < 2:
+            chosen.append(fit)
+        if len(chosen) == keep:
+            break
+    return chosen

@@ -231,6 +231,14 @@ class Problem:
             placement=float(((height / weights.offset_spread) ** 2).sum()) / frames,
         )
 
+    def reprojection(self, state: State) -> float:
+        """Median distance in px of the landmarks from where the body puts them; NaN where there are none."""
+        if not self.in_image.any():
+            return float("nan")
+        points = place_points(self.landmarks, forward(self.body, state.pose), state.pose.betas)
+        gap = state.camera.project(points, self.seen.image_size) - self.pixels
+        return float(np.median(np.linalg.norm(gap, axis=2)[self.in_image]))
+
     def _height(self, state: State, surface: Surface) -> np.ndarray:
         """(M,) m of each marker above the skin."""
         return np.einsum("mk,mk->m", state.placement.shaped(state.pose.betas) - surface.point, surface.normal)

@@ -1,0 +1,69 @@
+"""How sure the first answer is, and what stands against it, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.body.skeleton import JOINTS, mirror_index
+from solver.rotations import log_so3
+from solver.solve.problem import Observations
+from solver.solve.results import Candidate, Localization, Orientation
+
+_SAME_BONES = 0.8
+_SAME_TURN_DEG = 35.0
+_STILL_DEG = 12.0
+
+
+def judge(candidates: tuple[Candidate, ...], seen: Observations, found: Localization) -> Orientation:
+    """Rank is given; find the best different answer, and say what is ambiguous."""
+    best = candidates[0]
+    rivals = [i for i, c in enumerate(candidates) if c.refined and i and not same_answer(best, c)]
+    runner_up = rivals[0] if rivals else -1
+    margin = candidates[runner_up].energy / max(best.energy, 1e-9) if rivals else float("inf")
+    warnings = []
+    moved = movement_deg(seen.prior)
+    if moved < _STILL_DEG:
+        warnings.append(
+            f"The person hardly moves (joints turn by {moved:.0f} degrees in the video), so markers cannot be told apart "
+            "by their motion: check which bones they were given to."
+        )
+    if rivals and margin < 1.15:
+        warnings.append(_tie(best, candidates[runner_up], margin))
+    confidence = float(1 / (1 + np.exp(-(np.log(max(margin, 1e-9)) / np.log(1.15)) * np.log(19)))) if rivals else 0.99
+    if moved < _STILL_DEG:
+        confidence = min(confidence, 0.6)
+    return Orientation(candidates, float(margin), runner_up, confidence, tuple(warnings))
+
+
+def same_answer(one: Candidate, other: Candidate) -> bool:
+    """Whether two candidates give the markers to the same bones and stand the body the same way."""
+    turn = np.degrees(np.linalg.norm(log_so3(one.camera.R_lab_cam.T @ other.camera.R_lab_cam)))
+    agree = _bone_agreement(one.bone, other.bone)
+    return bool(agree >= _SAME_BONES and turn <= _SAME_TURN_DEG)
+
+
+def _bone_agreement(one: np.ndarray, other: np.ndarray) -> float:
+    return float(np.mean(one == other))
+
+
+def movement_deg(prior: np.ndarray) -> float:
+    """How far the person's limbs turn in the video: degrees, the third largest of the joints' ranges."""
+    middle = prior[len(prior) // 2]
+    turns = np.degrees(log_so3(np.swapaxes(middle, -1, -2) @ prior[:: max(1, len(prior) // 400)]))
+    spread = np.linalg.norm(np.percentile(turns, 95, axis=0) - np.percentile(turns, 5, axis=0), axis=-1)
+    return float(np.sort(spread[:22])[-3])
+
+
+def _tie(best: Candidate, rival: Candidate, margin: float) -> str:
+    mirrored = mirror_index()
+    is_mirror = _bone_agreement(mirrored[best.bone], rival.bone) >= 0.6
+    excess = (margin - 1) * 100
+    if is_mirror and any(JOINTS[b].startswith(("left", "right")) for b in best.bone):
+        return (
+            f"Left and right can hardly be told apart: the markers may as well sit on the {rival.part} as on the "
+            f"{best.part} (energy only {excess:.0f} % higher). Give the camera of a full-body trial, or pin the candidate."
+        )
+    return (
+        f"A second answer is nearly as good ({rival.part}, camera looking towards {rival.heading_deg:.0f} degrees; energy "
+        f"only {excess:.0f} % higher): compare the candidates and pin the right one."
+    )

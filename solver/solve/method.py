@@ -1,0 +1,263 @@
+"""The default method as three stages with results that can be drawn: localize, orient, fit."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from solver.body.model import Body
+from solver.body.skeleton import JOINTS, PARTS
+from solver.errors import InputError
+from solver.localize import Hypothesis, Search, hypotheses
+from solver.progress import Progress, silent
+from solver.rotations import log_so3
+from solver.solve.bundle import Fit, relax
+from solver.solve.kinematics import Points, Pose, forward, place_points
+from solver.solve.placement import Skin
+from solver.solve.problem import Camera, Observations, Problem, State, Surface, Weights
+from solver.solve.refine import every_frame
+from solver.solve.results import CameraResult, Candidate, FittedMotion, Localization, Orientation
+
+
+@dataclass(frozen=True)
+class LocalizeSettings:
+    """How widely to look for where the markers sit.
+
+    Attributes
+    ----------
+    yaws : starts of the camera's heading, evenly spread over the circle
+    few, many : keyframes of the coarse and of the fine solve
+    keep : hypotheses handed on
+    seen_share : share of the frames in which a marker must be seen to be used in the search
+    any_orientation : also try lab frames that do not stand upright
+    """
+
+    yaws: int = 12
+    few: int = 12
+    many: int = 40
+    keep: int = 24
+    seen_share: float = 0.05
+    any_orientation: bool = False
+
+
+@dataclass(frozen=True)
+class OrientSettings:
+    """How the hypotheses are fitted and compared.
+
+    Attributes
+    ----------
+    refine : hypotheses refined to the end
+    offset_mm, offset_spread_mm : marker centre above the skin
+    prior_deg : spread of the video's joint rotations
+    focal_guess : focal length as a share of the image's longer side, where no camera is given
+    """
+
+    refine: int = 4
+    offset_mm: float = 9.5
+    offset_spread_mm: float = 2.0
+    prior_deg: float = 15.0
+    focal_guess: float = 0.85
+
+    def weights(self) -> Weights:
+        """The same as weights of the fit."""
+        return Weights(
+            offset=self.offset_mm / 1000,
+            offset_spread=self.offset_spread_mm / 1000,
+            prior_deg=self.prior_deg,
+            focal_guess=self.focal_guess,
+        )
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """Which answer goes on to every frame.
+
+    Attributes
+    ----------
+    candidate : row of the orientation's candidates to use, pinned by hand; None takes the first
+    """
+
+    candidate: int | None = None
+
+
+def localize(
+    body: Body, seen: Observations, left_out: np.ndarray, settings: LocalizeSettings, camera: CameraResult | None = None
+) -> Localization:
+    """Hypotheses of where the markers sit.
+
+    Parameters
+    ----------
+    body : with bone lengths among its shape coefficients
+    seen : all T frames
+    left_out : (M,) True for markers that the user left out
+    camera : from another trial of the same session
+    """
+    present = np.isfinite(seen.markers).all(axis=2)
+    used = np.flatnonzero((present.mean(axis=0) >= settings.seen_share) & (present.sum(axis=0) >= 3) & ~left_out)
+    if len(used) < 3:
+        raise InputError(
+            f"only {len(used)} markers are seen in enough frames", "the markers", "record or keep at least 3 markers"
+        )
+    few = keyframes(seen, used, settings.few)
+    many = np.union1d(few, keyframes(seen, used, settings.many))
+    betas = np.zeros(body.shape_count)
+    vertices = np.intersect1d(body.lod_index, np.flatnonzero(body.marker_mask))[::3]
+    placement, _ = Skin(body, betas).on_vertices(vertices, Weights().offset)
+    still = Pose(seen.prior[few], np.repeat(-body.joint_template[:1], len(few), axis=0), betas)
+    points = place_points(placement, forward(body, still), betas)
+    bone = body.weights[vertices].argmax(axis=1)
+    search = Search(yaws=settings.yaws, keep=settings.keep, any_orientation=settings.any_orientation)
+    found = hypotheses(
+        seen.markers[few][:, used], points, vertices, bone, search, None if camera is None else camera.R_lab_cam
+    )
+    vertex = np.stack([h.vertex for h in found])
+    return Localization(
+        markers=used,
+        few=few,
+        many=many,
+        vertex=vertex,
+        bone=body.weights[vertex].argmax(axis=2),
+        R_lab_cam=np.stack([h.R_lab_cam for h in found]),
+        trans=np.stack([h.trans for h in found]),
+        cost_mm=np.sqrt([h.cost for h in found]) * 1000,
+        start=tuple(h.start for h in found),
+        yaw_deg=np.array([h.yaw_deg for h in found]),
+    )
+
+
+def keyframes(seen: Observations, used: np.ndarray, count: int) -> np.ndarray:
+    """Ascending frame numbers, evenly spread over the frames with a tracked video and most markers in sight."""
+    share = np.isfinite(seen.markers[:, used]).all(axis=2).mean(axis=1)
+    good = np.flatnonzero(seen.tracked & (share >= min(0.5, 0.8 * float(share.max()))))
+    if len(good) < 2:
+        good = np.flatnonzero(share >= 0.8 * share.max())
+    if not seen.tracked.any():
+        raise InputError(
+            "the video tracks the person at no time when markers were recorded",
+            "the video",
+            "check that both show the same movement, and the offset between them",
+        )
+    return np.unique(good[np.linspace(0, len(good) - 1, min(count, len(good))).round().astype(int)])
+
+
+def orient(
+    body: Body, seen: Observations, landmarks: Points, found: Localization, settings: OrientSettings,
+    camera: CameraResult | None = None, progress: Progress = silent,
+) -> Orientation:
+    """Every hypothesis relaxed, the best refined, all ranked."""
+    from solver.solve.confidence import judge
+
+    used = replace(seen, markers=seen.markers[:, found.markers])
+    guesses = tuple(
+        Hypothesis(v, r, t, float(c), s, float(y))
+        for v, r, t, c, s, y in zip(
+            found.vertex, found.R_lab_cam, found.trans, found.cost_mm, found.start, found.yaw_deg, strict=True
+        )
+    )
+    weights = settings.weights()
+    known = None
+    if camera is not None:
+        known = _camera_of(camera, used.lab_centre)
+        weights = replace(weights, free_camera=False)
+    fits = relax(
+        body, used, landmarks, guesses, found.few, found.many, weights, keep=settings.refine, camera=known, progress=progress
+    )
+    index = {id(guess): i for i, guess in enumerate(guesses)}
+    whole = Problem(body, used.at(found.many), landmarks)
+    candidates = tuple(_candidate(body, fit, index[id(fit.start)], whole) for fit in fits)
+    return judge(candidates, used, found)
+
+
+def fit(
+    body: Body, seen: Observations, landmarks: Points, found: Localization, ranked: Orientation, time: np.ndarray,
+    orient_settings: OrientSettings, settings: FitSettings, progress: Progress = silent,
+) -> FittedMotion:
+    """The chosen answer carried to every frame."""
+    row = 0 if settings.candidate is None else settings.candidate
+    if not 0 <= row < len(ranked.candidates):
+        raise InputError(
+            f"is {row}", "the pinned candidate", f"pin one of the {len(ranked.candidates)} candidates, counted from 0"
+        )
+    chosen = ranked.candidates[row]
+    used = replace(seen, markers=seen.markers[:, found.markers])
+    placement = Points(chosen.rest, chosen.dirs, chosen.weights)
+    surface = Surface(chosen.surface, chosen.normal)
+    frames = found.many if chosen.refined else found.few
+    state = State(Pose(chosen.rotations, chosen.trans, chosen.betas), placement, _camera_of(chosen.camera, used.lab_centre))
+    pose = every_frame(body, used, landmarks, frames, state, surface, orient_settings.weights(), progress)
+    links = forward(body, pose)
+    count = seen.markers.shape[1]
+    placed = np.full((len(time), count, 3), np.nan)
+    placed[:, found.markers] = place_points(placement, links, pose.betas)
+    joint, vertex = np.full(count, -1), np.full(count, -1)
+    joint[found.markers], vertex[found.markers] = chosen.bone, chosen.vertex
+    pinned = settings.candidate is not None
+    return FittedMotion(
+        time=time,
+        rotations=pose.rotations,
+        trans=pose.trans,
+        betas=pose.betas,
+        joints=links.place,
+        marker_joint=joint,
+        marker_vertex=vertex,
+        placed=placed,
+        residual=np.linalg.norm(seen.markers - placed, axis=2),
+        camera=chosen.camera,
+        chosen=row,
+        confidence=1.0 if pinned else ranked.confidence,
+        warnings=(f"Candidate {row} was pinned by hand.",) if pinned else ranked.warnings,
+    )
+
+
+def _camera_of(camera: CameraResult, centre: np.ndarray) -> Camera:
+    """The camera written about a lab point, as the fit wants it."""
+    return Camera(camera.R_lab_cam, (centre - camera.position) @ camera.R_lab_cam, centre, camera.focal)
+
+
+def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem) -> Candidate:
+    state, camera = fitted.state, fitted.state.camera
+    refined = len(state.pose.trans) == len(whole.target)
+    bone = state.placement.weights.argmax(axis=1)
+    view = camera.R_lab_cam[:, 2]
+    return Candidate(
+        hypothesis=hypothesis,
+        refined=refined,
+        energies=asdict(fitted.energies),
+        energy=fitted.energies.total,
+        bone=bone,
+        vertex=Skin(body, state.pose.betas).nearest_vertex(state.placement.shaped(state.pose.betas)),
+        part=part_name(bone),
+        heading_deg=float(np.degrees(np.arctan2(view[1], view[0]))),
+        camera=CameraResult(
+            camera.R_lab_cam,
+            camera.centre - camera.R_lab_cam @ camera.shift,
+            camera.focal,
+            whole.seen.image_size,
+            whole.reprojection(state) if refined else float("nan"),
+        ),
+        rest=state.placement.rest,
+        dirs=state.placement.dirs,
+        weights=state.placement.weights,
+        surface=fitted.surface.point,
+        normal=fitted.surface.normal,
+        betas=state.pose.betas,
+        rotations=state.pose.rotations,
+        trans=state.pose.trans,
+        trace=fitted.trace,
+    )
+
+
+def part_name(bone: np.ndarray) -> str:
+    """The part of the body that carries most of the markers, in words."""
+    carried = {JOINTS[b] for b in bone}
+    if len(carried) > 8 or {"left", "right"} <= {name.split("_")[0] for name in carried} and len(carried) > 4:
+        return "whole body" if len(carried) > 10 else "several parts"
+    counts = {part: sum(JOINTS[b] in names for b in bone) for part, names in PARTS.items()}
+    best = max(counts, key=lambda part: counts[part])
+    return best.replace("_", " ") if counts[best] >= 0.6 * len(bone) else ", ".join(sorted(carried)).replace("_", " ")
+
+
+def angle_between(first: np.ndarray, second: np.ndarray) -> float:
+    """Degrees between two rotations (3, 3)."""
+    return float(np.degrees(np.linalg.norm(log_so3(first.T @ second))))
