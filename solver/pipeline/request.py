@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import typing
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
 
@@ -28,8 +28,7 @@ class SolveRequest:
     video : video of the same movement
     prior : poses reconstructed from the video by another program, instead of the embedded network's
     camera : result folder of another trial of the same session, to take the camera from
-    offset : s, what to add to the video's time to have the marker file's
-    rate_ratio : true frame rate of the video over the one that its file states
+    offset, rate_ratio : s and 1, marker time = rate_ratio * video time + offset
     up : vertical axis of the marker file
     units : length unit of the marker file
     subject : whose markers to take where a file holds several people's
@@ -63,37 +62,67 @@ class SolveRequest:
         for name, literal in (("up", Up), ("units", Units), ("method", Method), ("convention", Convention)):
             value, choices = getattr(self, name), typing.get_args(literal)
             if value is not None and value not in choices:
-                raise InputError(f'is "{value}"', option(name), f"use {' or '.join(choices)}")
+                raise InputError(f'"{value}" is not known', option(name), f"use {' or '.join(choices)}")
         for name in ("offset", "rate_ratio", "marker_rate"):
             value = getattr(self, name)
             if value is not None and not math.isfinite(value):
-                raise InputError(f"is {value}", option(name), "give a finite number")
+                raise InputError(f"{value} is not possible", option(name), "give a finite number")
         for name in ("rate_ratio", "marker_rate"):
             value = getattr(self, name)
             if value is not None and value <= 0:
-                raise InputError(f"is {value:g}", option(name), "give a number above 0")
+                raise InputError(f"{value:g} is not possible", option(name), "give a number above 0")
         if self.seed is not None and self.seed < 0:
-            raise InputError(f"is {self.seed}", option("seed"), "give 0 or a positive whole number")
+            raise InputError(f"{self.seed} is not possible", option("seed"), "give 0 or a positive whole number")
         if self.range is not None:
             _check_range(*self.range)
 
 
 @dataclass(frozen=True)
-class SolveOutcome:
-    """What one solve found and wrote.
+class EvaluateRequest:
+    """One comparison.
 
     Attributes
     ----------
-    out : folder that holds the results
-    summary : what ``--json`` prints: stage times in seconds, energies, confidence... (plain JSON values)
+    result : folder that a solve wrote, or its motion.npz
+    reference : another result, or an AMASS-layout npz
+    body : the SMPL-layout model that the reference was made with, if not the result's body
+    """
+
+    result: Path
+    reference: Path
+    body: Path | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What a command found.
+
+    Attributes
+    ----------
+    summary : what ``--json`` prints (plain JSON values; for a solve: stage times in seconds, energies, confidence...)
     lines : the same for a person, one sentence each
     warnings : what the user should doubt, one sentence each
     """
 
-    out: Path
     summary: Mapping[str, Any]
     lines: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = field(default=())
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolveOutcome(Outcome):
+    """What a solve found, and ``out``, the folder that it wrote it to."""
+
+    out: Path
+
+
+def check_inputs(request: SolveRequest | EvaluateRequest) -> None:
+    """Refuse files that are not there before any work is done."""
+    for field in fields(request):
+        path = getattr(request, field.name)
+        if isinstance(path, Path) and field.name != "out" and not path.exists():
+            named = f" ({option(field.name)})" if field.default is None else ""
+            raise InputError(f"there is no such file{named}", path, "check the name and the folder")
 
 
 def option(name: str) -> str:
@@ -109,7 +138,7 @@ def parse_range(text: str) -> tuple[float | None, float | None]:
             raise ValueError(text)
         ends = tuple(float(end) if end.strip() else None for end in (start, stop))
     except ValueError as error:
-        raise InputError(f'is "{text}"', "--range", "give A:B in seconds, for example 2.5:10") from error
+        raise InputError(f'"{text}" is not understood', "--range", "give A:B in seconds, for example 2.5:10") from error
     _check_range(*ends)
     return ends[0], ends[1]
 
@@ -117,6 +146,6 @@ def parse_range(text: str) -> tuple[float | None, float | None]:
 def _check_range(start: float | None, stop: float | None) -> None:
     for end in (start, stop):
         if end is not None and not math.isfinite(end):
-            raise InputError(f"has an end at {end}", "--range", "give finite seconds, or leave the end out")
+            raise InputError(f"it cannot end at {end}", "--range", "give finite seconds, or leave the end out")
     if start is not None and stop is not None and stop <= start:
-        raise InputError(f"ends at {stop:g} s and starts at {start:g} s", "--range", "give the earlier time first")
+        raise InputError(f"it ends at {stop:g} s and starts at {start:g} s", "--range", "give the earlier time first")

@@ -84,7 +84,7 @@ class Session:
             given = self.inputs.get(name)
             if given is not None and not given.path.is_file():
                 raise InputError(
-                    f"the {name} file of {self.folder / FILE_NAME} is not there any more",
+                    f"the {name.removesuffix('_file')} file of {self.folder / FILE_NAME} is not there any more",
                     given.path,
                     "move it back, or correct its path in that file",
                 )

@@ -1,0 +1,143 @@
+"""The command line: what can be asked, and how every ending is told.
+
+Imports nothing heavy, so that ``--help`` and a mistyped option answer at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import NoReturn, get_args
+
+from app.cli_commands import SERVICES, Services, run_demo, run_evaluate, run_solve
+from app.cli_endings import CANCELLED, REFUSED, ended
+from solver import __version__
+from solver.pipeline.request import Convention, Method, Units, Up, parse_range
+
+COMMANDS = {
+    "demo": "solve the embedded session and say how close it came to the known truth",
+    "solve": "from markers and a video to a body, named markers and joint angles",
+    "evaluate": "how far a result is from another one or from a reference",
+}
+
+
+def main(arguments: Sequence[str] | None = None, services: Services = SERVICES) -> int:
+    """Run one command; returns its exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(AttributeError):  # a terminal that cannot show a character shows its code instead
+            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+    words = _attach_negative_values(sys.argv[1:] if arguments is None else list(arguments))
+    debug = "--debug" in words
+    try:
+        if not words or (words[0] not in COMMANDS and not words[0].startswith("-")):
+            return _no_window(words)
+        options = _parser().parse_args(words)
+        return int(options.run(options, services))
+    except SystemExit as error:
+        return int(error.code or 0)
+    except KeyboardInterrupt:
+        print("Cancelled.", file=sys.stderr)
+        return CANCELLED
+    except Exception as error:
+        return ended(error, debug)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with exit code 2."""
+        print(f"{self.prog}: {message}; see {self.prog} --help.", file=sys.stderr)
+        raise SystemExit(REFUSED)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="markerscope", description="From unlabelled optical markers and one video to joint angles.")
+    parser.add_argument("--version", action="version", version=f"markerscope {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=_Parser)
+
+    demo = commands.add_parser("demo", help=COMMANDS["demo"], description=_sentence("demo"))
+    demo.add_argument(
+        "--out", type=Path, default=Path("demo-out"), metavar="DIR", help="results (default: %(default)s)"
+    )
+    demo.add_argument("--headless", action="store_true", help="stay in the terminal, open no window")
+    _common(demo)
+    demo.set_defaults(run=run_demo)
+
+    solve = commands.add_parser("solve", help=COMMANDS["solve"], description=_sentence("solve"))
+    _solve_options(solve)
+    _common(solve)
+    solve.set_defaults(run=run_solve)
+
+    evaluate = commands.add_parser("evaluate", help=COMMANDS["evaluate"], description=_sentence("evaluate"))
+    evaluate.add_argument("result", type=Path, metavar="RESULT", help="folder that solve wrote, or its motion.npz")
+    evaluate.add_argument("reference", type=Path, metavar="REFERENCE", help="another result, or an AMASS-layout npz")
+    evaluate.add_argument("--body", type=Path, metavar="FILE", help="SMPL-layout model of the reference")
+    _common(evaluate)
+    evaluate.set_defaults(run=run_evaluate)
+    return parser
+
+
+def _solve_options(solve: argparse.ArgumentParser) -> None:
+    solve.add_argument("markers", type=Path, metavar="MARKERS|SESSION", help="C3D, TRC, CSV or TSV file, or a session")
+    solve.add_argument("--out", type=Path, metavar="DIR", help="folder for the results (a session has its own)")
+
+    inputs = solve.add_argument_group("beside the markers")
+    inputs.add_argument("--video", type=Path, metavar="FILE", help="video of the same movement")
+    inputs.add_argument("--prior", type=Path, metavar="FILE", help="poses by 4D-Humans, WHAM, GVHMR, TRAM; AMASS npz")
+    inputs.add_argument("--camera", type=Path, metavar="RESULT", help="take the camera from another trial's result")
+    inputs.add_argument("--body", type=Path, metavar="FILE", help="an SMPL-layout model instead of the embedded body")
+
+    reading = solve.add_argument_group("reading the markers (by default as the file says, else guessed and reported)")
+    reading.add_argument("--up", choices=get_args(Up), help="vertical axis of the file")
+    reading.add_argument("--units", choices=get_args(Units), help="length unit of the file")
+    reading.add_argument("--marker-rate", type=float, metavar="HZ", help="frames a second")
+    reading.add_argument("--subject", metavar="NAME", help="whose markers, where a file holds several people's")
+    reading.add_argument("--range", type=parse_range, metavar="A:B", help="seconds to solve, in the file's clock")
+
+    timing = solve.add_argument_group("timing of the video (by default found from the motion)")
+    timing.add_argument("--offset", type=float, metavar="SECONDS", help="marker time = R * video time + SECONDS")
+    timing.add_argument("--rate-ratio", type=float, metavar="R", help="see --offset; 1 where both clocks are right")
+
+    how = solve.add_argument_group("solving")
+    how.add_argument("--method", choices=get_args(Method), help="how the body is fitted (default: bundle)")
+    how.add_argument("--convention", choices=get_args(Convention), help="names and signs of the angles")
+    how.add_argument("--seed", type=int, metavar="N", help="of every random choice (default: 0)")
+
+
+def _common(parser: argparse.ArgumentParser) -> None:
+    output = parser.add_argument_group("output")
+    output.add_argument("--json", action="store_true", help="print a machine-readable summary as the last line")
+    output.add_argument("--quiet", action="store_true", help="no progress and no text, only errors")
+    output.add_argument("--debug", action="store_true", help="show where in the program an error arose")
+
+
+def _sentence(command: str) -> str:
+    text = COMMANDS[command]
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _attach_negative_values(words: list[str]) -> list[str]:
+    """``--offset -1e-3`` as ``--offset=-1e-3``: argparse would take such a number for an option."""
+    joined: list[str] = []
+    for word in words:
+        if joined and joined[-1] in ("--offset", "--range") and re.match(r"-[\d.:]", word):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
+def _no_window(words: Sequence[str]) -> int:
+    """Say what there is instead of the window."""
+    names = ", ".join(COMMANDS)
+    if words and not Path(words[0]).exists():
+        problem = f'"{words[0]}" is neither a command nor a file'
+    else:
+        problem = "this version has no window yet"
+    print(f"markerscope: {problem}; the commands are {names} (markerscope solve --help).", file=sys.stderr)
+    return REFUSED

@@ -1,0 +1,93 @@
+"""What each command does, around the functions of the solver."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from app.cli_output import Terminal
+from resources import resource
+from solver.errors import InputError
+from solver.pipeline.request import EvaluateRequest, Outcome, SolveOutcome, SolveRequest, check_inputs
+from solver.progress import Progress
+
+DEMO_SESSION = resource("demo")
+"""A session folder, and beside its inputs the truth they were made from."""
+DEMO_TRUTH = resource("demo", "truth.npz")
+
+
+def _solve(request: SolveRequest, progress: Progress) -> SolveOutcome:
+    from solver.pipeline import solve_session
+
+    return solve_session(request, progress)
+
+
+def _evaluate(request: EvaluateRequest, progress: Progress) -> Outcome:
+    from solver.pipeline import evaluate_result
+
+    return evaluate_result(request, progress)
+
+
+@dataclass(frozen=True)
+class Services:
+    """The solver's functions that the commands call, loaded when they are needed."""
+
+    solve: Callable[[SolveRequest, Progress], SolveOutcome] = _solve
+    evaluate: Callable[[EvaluateRequest, Progress], Outcome] = _evaluate
+
+
+SERVICES = Services()
+
+
+def run_solve(options: argparse.Namespace, services: Services) -> int:
+    """``markerscope solve``."""
+    request = SolveRequest(**{field.name: getattr(options, field.name) for field in fields(SolveRequest)})
+    with Terminal(options) as terminal:
+        terminal.show(_solve_into(request, services, terminal.progress))
+    return 0
+
+
+def run_demo(options: argparse.Namespace, services: Services) -> int:
+    """``markerscope demo``: the embedded session, then its result against the truth."""
+    with Terminal(options) as terminal:
+        request = SolveRequest(markers=DEMO_SESSION, out=options.out)
+        solved = _solve_into(request, services, terminal.progress)
+        compared = services.evaluate(EvaluateRequest(solved.out, DEMO_TRUTH), terminal.progress)
+        terminal.show(
+            Outcome(
+                summary={**solved.summary, "evaluation": dict(compared.summary)},
+                lines=(*solved.lines, "Against the known truth:", *compared.lines),
+                warnings=(*solved.warnings, *compared.warnings),
+            )
+        )
+    return 0
+
+
+def run_evaluate(options: argparse.Namespace, services: Services) -> int:
+    """``markerscope evaluate``."""
+    request = EvaluateRequest(options.result, options.reference, options.body)
+    with Terminal(options) as terminal:
+        check_inputs(request)
+        terminal.show(services.evaluate(request, terminal.progress))
+    return 0
+
+
+def _solve_into(request: SolveRequest, services: Services, progress: Progress) -> SolveOutcome:
+    """Solve, after a look at whether the result can be written at all; a refused input leaves no empty folder."""
+    from solver.pipeline.output import check_output_folder, remove_if_empty
+    from solver.pipeline.session import session_folder
+
+    check_inputs(request)
+    out: Path | None = request.out or session_folder(request.markers)
+    if out is None:
+        raise InputError("no folder for the results was named", remedy="add --out DIR")
+    new = not out.exists()
+    check_output_folder(out)
+    try:
+        return services.solve(request, progress)
+    except BaseException:
+        if new:
+            remove_if_empty(out)
+        raise
