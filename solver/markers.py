@@ -7,6 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+from solver.errors import InputError
+
 UpAxis = Literal["x", "y", "z"]
 
 _R_LAB_INTERNAL = {
@@ -68,3 +70,22 @@ class Markers:
             first_time=self.first_time + start / self.rate,
             filled=None if self.filled is None else self.filled[frames][:, markers],
         )
+
+    def between(self, start: float | None, stop: float | None) -> Markers:
+        """The frames from ``start`` to ``stop`` s in the file's clock; None leaves that end open."""
+        if start is None and stop is None:
+            return self
+        inside = np.ones(len(self.positions), bool)
+        slack = 1e-6 / self.rate
+        if start is not None:
+            inside &= self.time >= start - slack
+        if stop is not None:
+            inside &= self.time <= stop + slack
+        frames = np.flatnonzero(inside)
+        if not len(frames):
+            raise InputError(
+                f"no frame lies in the range asked for; the recording runs from {self.time[0]:g} s to {self.time[-1]:g} s",
+                self.source,
+                "choose a range inside it",
+            )
+        return self.select(slice(int(frames[0]), int(frames[-1]) + 1))

@@ -53,3 +53,29 @@ def subtrees(size: int) -> tuple[frozenset[int], ...]:
     for _ in range(size - 1):
         level = {tree | {n} for tree in level for j in tree for n in neighbours[j] - tree}
     return tuple(sorted(level, key=sorted))
+
+
+BONES = {
+    "pelvis": "pelvis",
+    "spine1": "lumbar",
+    "spine2": "lower_thorax",
+    "spine3": "thorax",
+    "neck": "neck",
+    "head": "head",
+    **{
+        f"{side}_{joint}": f"{side}_{bone}"
+        for side in ("left", "right")
+        for joint, bone in {
+            "hip": "thigh",
+            "knee": "shank",
+            "ankle": "foot",
+            "foot": "toes",
+            "collar": "clavicle",
+            "shoulder": "upper_arm",
+            "elbow": "forearm",
+            "wrist": "hand",
+            "hand": "fingers",
+        }.items()
+    },
+}
+"""What people call the bone that turns about each joint: the names that labelled markers get."""

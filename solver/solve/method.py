@@ -76,9 +76,11 @@ class FitSettings:
     Attributes
     ----------
     candidate : row of the orientation's candidates to use, pinned by hand; None takes the first
+    prior_deg : spread of the video's joint rotations
     """
 
     candidate: int | None = None
+    prior_deg: float = 15.0
 
 
 def localize(
@@ -171,7 +173,7 @@ def orient(
 
 def fit(
     body: Body, seen: Observations, landmarks: Points, found: Localization, ranked: Orientation, time: np.ndarray,
-    orient_settings: OrientSettings, settings: FitSettings, progress: Progress = silent,
+    settings: FitSettings, progress: Progress = silent,
 ) -> FittedMotion:
     """The chosen answer carried to every frame."""
     row = 0 if settings.candidate is None else settings.candidate
@@ -185,7 +187,7 @@ def fit(
     surface = Surface(chosen.surface, chosen.normal)
     frames = found.many if chosen.refined else found.few
     state = State(Pose(chosen.rotations, chosen.trans, chosen.betas), placement, _camera_of(chosen.camera, used.lab_centre))
-    pose = every_frame(body, used, landmarks, frames, state, surface, orient_settings.weights(), progress)
+    pose = every_frame(body, used, landmarks, frames, state, surface, Weights(prior_deg=settings.prior_deg), progress)
     links = forward(body, pose)
     count = seen.markers.shape[1]
     placed = np.full((len(time), count, 3), np.nan)

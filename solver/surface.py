@@ -1,0 +1,49 @@
+"""How far the markers are from the fitted skin: the m2s of Milef et al. (2024), section 4.1.1."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.body.model import Body
+from solver.progress import Progress, silent
+from solver.solve.results import FittedMotion
+
+_MOST_FRAMES = 100
+
+
+@dataclass(frozen=True)
+class SurfaceDistance:
+    """Distance of markers to the skin.
+
+    Attributes
+    ----------
+    mean, median : m, over all markers and the frames looked at
+    per_marker : (M,) m, mean; NaN for markers never seen in them
+    frames : the frame numbers looked at, evenly spread
+    """
+
+    mean: float
+    median: float
+    per_marker: np.ndarray
+    frames: np.ndarray
+
+
+def surface_distance(
+    body: Body, motion: FittedMotion, positions: np.ndarray, progress: Progress = silent
+) -> SurfaceDistance:
+    """Unsigned distance of every marker (T, M, 3) m to the closest point of the posed body."""
+    from solver.metrics import marker_to_surface
+
+    count = len(positions)
+    frames = np.unique(np.linspace(0, count - 1, min(count, _MOST_FRAMES)).round().astype(int))
+    vertices, _ = body.pose(motion.rotations[frames], motion.betas, motion.trans[frames])
+    distance = marker_to_surface(positions[frames], vertices, body.faces, progress=progress)
+    with np.errstate(invalid="ignore"):
+        seen = np.isfinite(distance)
+        per_marker = np.where(seen, distance, 0).sum(0) / np.where(seen.any(0), seen.sum(0), np.nan)
+    known = distance[seen]
+    if not len(known):
+        return SurfaceDistance(float("nan"), float("nan"), per_marker, frames)
+    return SurfaceDistance(float(known.mean()), float(np.median(known)), per_marker, frames)
