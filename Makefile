@@ -1,5 +1,7 @@
-# Every target sets up what it needs first; see tools/setup_env.py.
-PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3,$(if $(shell $(name) -c "" 2>/dev/null && echo yes),$(name))))
+# Everything runs through tools/setup_env.py, which sets up what is missing first.
+ifndef PYTHON
+PYTHON := $(firstword $(foreach name,python3.11 python3.12 python3,$(if $(shell $(name) -c "" 2>/dev/null && echo yes),$(name))))
+endif
 ENV = $(PYTHON) tools/setup_env.py
 # Two test processes of one thread each: small operations on spinning threads are slower than on one.
 export OMP_NUM_THREADS ?= 1
@@ -7,23 +9,25 @@ export OMP_WAIT_POLICY ?= passive
 
 .PHONY: demo test lint format setup need-python
 
-demo: setup  ## solve the embedded session and say how close it came
+# Solve the embedded session and say how close it came to the known truth.
+demo: need-python
 	$(ENV) markerscope demo --headless --out demo-out
 
-test: lint  ## everything that must hold
+# Everything that must hold.
+test: lint
 	$(ENV) python -m pytest -q -n 2
 
-lint: setup
+lint: need-python
 	$(ENV) ruff check .
 	$(ENV) ruff format --check .
 	$(ENV) mypy
 
-format: setup
+format: need-python
 	$(ENV) ruff check --fix .
 	$(ENV) ruff format .
 
 setup: need-python
-	@$(ENV)
+	$(ENV)
 
 need-python:
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or 3.12 is needed (on Debian 12: apt-get install python3 python3-venv)." >&2; exit 1; }
