@@ -14,6 +14,8 @@ import numpy as np
 from solver.progress import Progress, silent
 from solver.rotations import kabsch, slerp
 
+_FRAMES_AT_ONCE = 16
+
 
 @dataclass(frozen=True, eq=False)
 class PointErrors:
@@ -29,35 +31,6 @@ class PointErrors:
     mean: float
     per_point: np.ndarray
     per_frame: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class SurfaceDistances:
-    """Distances of markers to the body's surface.
-
-    Attributes
-    ----------
-    signed : (T', M) m, outside positive; NaN where the marker is lost
-    frames : (T',) the frames that were looked at
-    """
-
-    signed: np.ndarray
-    frames: np.ndarray
-
-    @property
-    def unsigned(self) -> np.ndarray:
-        """(T', M) m."""
-        return np.abs(self.signed)
-
-    @property
-    def mean(self) -> float:
-        """m2s of Milef et al. (2024): the mean unsigned distance, m."""
-        return nanmean(self.unsigned)
-
-    @property
-    def per_marker(self) -> np.ndarray:
-        """(M,) mean unsigned distance, m; NaN for a marker that is never seen."""
-        return nanmean_along(self.unsigned, 0)
 
 
 @dataclass(frozen=True)
@@ -131,43 +104,46 @@ def angle_difference(found: np.ndarray, reference: np.ndarray) -> AngleDifferenc
 
 def marker_to_surface(
     markers: np.ndarray,
+    vertices: np.ndarray | Callable[[np.ndarray], np.ndarray],
     faces: np.ndarray,
-    surface: Callable[[np.ndarray], np.ndarray],
     *,
-    stride: int = 1,
+    signed: bool = False,
     progress: Progress = silent,
-) -> SurfaceDistances:
-    """Distance of every marker to the body's surface, frame by frame.
+) -> np.ndarray:
+    """Distance of every marker to the body's surface, frame by frame; its mean is m2s.
 
     Parameters
     ----------
     markers : (T, M, 3) m, NaN = lost
+    vertices : (T, V, 3) m, or a function that gives those of the frames (n,) asked for, some at a time
     faces : (F, 3) vertex indices, outward orientation
-    surface : gives the vertices (n, V, 3) m of the frames (n,) asked for; asked for few at a time
-    stride : look at every ``stride``-th frame only
+    signed : negative inside the body
     progress : called along the way
 
-    Notes
-    -----
-    The sign is that of the smooth normal at the nearest surface point, so that an open mouth does no harm.
+    Returns
+    -------
+    (T, M) m, NaN where the marker or the body is lost
     """
-    frames = np.arange(0, len(markers), stride)
-    signed = np.full((len(frames), markers.shape[1]), np.nan)
-    for start in range(0, len(frames), 16):
-        chunk = frames[start : start + 16]
-        for row, vertices in zip(range(start, start + len(chunk)), surface(chunk)):
-            seen = np.isfinite(markers[frames[row]]).all(axis=1)
-            if seen.any() and np.isfinite(vertices).all():
-                signed[row, seen] = signed_distance(markers[frames[row]][seen], vertices, faces)
-        progress((start + len(chunk)) / len(frames), "measuring markers to the surface")
-    return SurfaceDistances(signed, frames)
+    surface = vertices if callable(vertices) else vertices.__getitem__
+    distance = np.full(markers.shape[:2], np.nan)
+    for start in range(0, len(markers), _FRAMES_AT_ONCE):
+        chunk = np.arange(start, min(start + _FRAMES_AT_ONCE, len(markers)))
+        for frame, mesh in zip(chunk, surface(chunk)):
+            seen = np.isfinite(markers[frame]).all(axis=1)
+            if seen.any() and np.isfinite(mesh).all():
+                distance[frame, seen] = distance_to_mesh(markers[frame][seen], mesh, faces, signed=signed)
+        progress((start + len(chunk)) / len(markers), "measuring markers to the surface")
+    return distance
 
 
-def signed_distance(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(N,) m from points (N, 3) to a mesh (V, 3), (F, 3); outside positive."""
+def distance_to_mesh(
+    points: np.ndarray, vertices: np.ndarray, faces: np.ndarray, *, signed: bool = False
+) -> np.ndarray:
+    """(N,) m from points (N, 3) to a mesh (V, 3), (F, 3).
+
+    The sign, negative inside, is that of the smooth normal at the nearest point, so that an open mouth does no harm.
+    """
     import open3d as o3d
-
-    from solver.body.model import vertex_normals
 
     centre = vertices.mean(axis=0)  # Open3D computes in float32: stay near the origin
     scene = o3d.t.geometry.RaycastingScene()
@@ -179,10 +155,14 @@ def signed_distance(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray)
     uv = nearest["primitive_uvs"].numpy().astype(float)
     triangle = faces[nearest["primitive_ids"].numpy().astype(np.intp)]
     shares = np.stack([1 - uv.sum(axis=1), uv[:, 0], uv[:, 1]], axis=1)
-    foot = np.einsum("nk,nkx->nx", shares, vertices[triangle])
+    away = points - np.einsum("nk,nkx->nx", shares, vertices[triangle])
+    distance = np.linalg.norm(away, axis=1)
+    if not signed:
+        return distance
+    from solver.body.model import vertex_normals
+
     normal = np.einsum("nk,nkx->nx", shares, vertex_normals(vertices, faces)[triangle])
-    away = points - foot
-    return np.copysign(np.linalg.norm(away, axis=1), np.einsum("nx,nx->n", away, normal))
+    return np.copysign(distance, np.einsum("nx,nx->n", away, normal))
 
 
 def points_at(time: np.ndarray, points: np.ndarray, wanted: np.ndarray) -> np.ndarray:

@@ -121,7 +121,7 @@ def test_distances_to_a_sphere() -> None:
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     radius = rng.uniform(0.02, 0.3, 50)
     centre = np.array([40.0, -20.0, 5.0])  # float32 alone would lose 4 micrometres here
-    found = metrics.signed_distance(direction * radius[:, None] + centre, vertices + centre, faces)
+    found = metrics.distance_to_mesh(direction * radius[:, None] + centre, vertices + centre, faces, signed=True)
     worst = np.abs(found - (radius - 0.1)).max()
     assert worst < 3e-4, f"{worst * 1000:.3f} mm off, the facets allow 0.3"
 
@@ -134,9 +134,11 @@ def test_distances_to_a_box_beyond_faces_edges_and_corners() -> None:
     points = rng.uniform(-3, 3, (400, 3))
     beyond = np.abs(points) - 1
     expected = np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
-    found = metrics.signed_distance(points, np.array(box.vertices), np.array(box.faces))
+    mesh = np.array(box.vertices), np.array(box.faces)
+    found = metrics.distance_to_mesh(points, *mesh, signed=True)
     worst = np.abs(found - expected).max()
     assert worst < 1e-5, f"{worst} m"
+    np.testing.assert_allclose(metrics.distance_to_mesh(points, *mesh), np.abs(expected), atol=1e-5)
 
 
 def test_the_sign_survives_an_open_mouth() -> None:
@@ -144,29 +146,28 @@ def test_the_sign_survives_an_open_mouth() -> None:
     vertices, faces = sphere()
     open_faces = faces[vertices[faces].mean(axis=1)[:, 2] < 0.09]
     inside = np.array([[0.0, 0.0, -0.05], [0.03, 0.02, 0.0]])
-    assert (metrics.signed_distance(inside, vertices, open_faces) < 0).all()
+    assert (metrics.distance_to_mesh(inside, vertices, open_faces, signed=True) < 0).all()
 
 
-def test_markers_over_frames_with_gaps_and_stride() -> None:
+def test_markers_over_frames_with_gaps() -> None:
     pytest.importorskip("open3d")
     vertices, faces = sphere()
     shift = np.linspace(0, 1, 41)[:, None] * np.array([1.0, 0, 0])
-    directions = np.eye(3)
-    markers = shift[:, None] + directions * np.array([0.11, 0.12, 0.09])[:, None]
+    markers = shift[:, None] + np.eye(3) * np.array([0.11, 0.12, 0.09])[:, None]
     markers[8, 1] = np.nan
-    markers[:, 2][4] = np.nan
+    markers[4, 2, 0] = np.nan
     asked: list[int] = []
 
     def surface(frames: np.ndarray) -> np.ndarray:
         asked.append(len(frames))
         return vertices + shift[frames][:, None]
 
-    found = metrics.marker_to_surface(markers, faces, surface, stride=4)
-    assert found.frames.tolist() == list(range(0, 41, 4)) and max(asked) <= 16
-    np.testing.assert_allclose(np.nanmean(found.signed, axis=0), [0.01, 0.02, -0.01], atol=3e-4)
-    np.testing.assert_allclose(found.per_marker, [0.01, 0.02, 0.01], atol=3e-4)
-    assert np.isnan(found.signed[2, 1]) and np.isnan(found.signed[1, 2])
-    assert found.mean == pytest.approx(np.nanmean(found.unsigned))
+    found = metrics.marker_to_surface(markers, surface, faces, signed=True)
+    assert sum(asked) == 41 and max(asked) <= 16
+    np.testing.assert_allclose(metrics.nanmean_along(found, 0), [0.01, 0.02, -0.01], atol=3e-4)
+    assert np.isnan(found[8, 1]) and np.isnan(found[4, 2]) and np.isnan(found).sum() == 2
+    whole = metrics.marker_to_surface(markers, vertices + shift[:, None], faces)
+    np.testing.assert_allclose(whole, np.abs(found), atol=1e-12)
 
 
 # clocks ---------------------------------------------------------------------------------------------------------------
