@@ -8,16 +8,19 @@ different answer is the confidence.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from solver.body.model import Body
 from solver.localize import Hypothesis
+from solver.parallel import spread
 from solver.progress import Progress, silent
 from solver.solve.kinematics import Points, Pose, blended_turn, forward, place_points
 from solver.solve.placement import Skin
 from solver.solve.refine import carried_over
-from solver.solve.problem import Camera, Energies, Observations, Problem, State, Surface, Weights
+from solver.solve.problem import Problem
+from solver.solve.state import Camera, Energies, Observations, State, Surface, Weights
 
 NOWHERE = Points(np.zeros((0, 3)), np.zeros((0, 3, 0)), np.zeros((0, 24)))
 
@@ -198,31 +201,36 @@ def relax(
     """
     problem = Problem(body, seen.at(few), landmarks)
     judge = phase_weights(base, COARSE[-1])
-    pool = []
-    for i, guess in enumerate(guesses):
-        progress(0.3 * i / len(guesses), f"hypothesis {i + 1} of {len(guesses)}")
+
+    def first_look(guess: Hypothesis) -> Fit:
         state, surface = start_state(problem, guess, base, camera)
-        pool.append(_advance(problem, Fit(guess, state, surface, problem.energies(state, judge, surface), ()), COARSE[:1], base, judge))
-    # Poor starts are dropped early; each phase costs as much as all before it.
+        begun = Fit(guess, state, surface, problem.energies(state, judge, surface), ())
+        return _advance(problem, begun, phases=COARSE[:1], base=base, judge=judge)
+
+    progress(0.0, f"relaxing {len(guesses)} hypotheses")
+    pool = spread(first_look, guesses)
+    # Poor starts are dropped early: each phase costs as much as all before it.
     for i, phase in enumerate(COARSE[1:]):
         pool.sort(key=lambda fit: fit.energies.total)
-        going, left = pool[: max(keep * 2, len(guesses) // 2**(i + 1))], pool[max(keep * 2, len(guesses) // 2**(i + 1)) :]
-        progress(0.3 + 0.15 * i, f"relaxing {len(going)} hypotheses")
-        pool = [_advance(problem, fit, (phase,), base, judge) for fit in going] + left
+        count = max(keep * 2, len(guesses) // 2 ** (i + 1))
+        progress(0.3 + 0.15 * i, f"relaxing {count} hypotheses")
+        pool = spread(partial(_advance, problem, phases=(phase,), base=base, judge=judge), pool[:count]) + pool[count:]
     pool.sort(key=lambda fit: fit.energies.total)
     chosen = _varied(pool, keep)
     judge = phase_weights(base, FINE[-1])
     whole = Problem(body, seen.at(many), landmarks)
-    fine = []
-    for i, fit in enumerate(chosen):
-        progress(0.6 + 0.4 * i / len(chosen), f"refining hypothesis {i + 1} of {len(chosen)}")
+    progress(0.6, f"refining {len(chosen)} hypotheses")
+
+    def last_look(fit: Fit) -> Fit:
         pose = carried_over(body, seen, few, fit.state).at(many)
-        fine.append(_advance(whole, replace(fit, state=replace(fit.state, pose=pose)), FINE, base, judge))
+        return _advance(whole, replace(fit, state=replace(fit.state, pose=pose)), phases=FINE, base=base, judge=judge)
+
+    fine = spread(last_look, chosen)
     fine.sort(key=lambda fit: fit.energies.total)
     return tuple(fine) + tuple(fit for fit in pool if not any(fit is one for one in chosen))
 
 
-def _advance(problem: Problem, fit: Fit, phases: tuple[Phase, ...], base: Weights, judge: Weights) -> Fit:
+def _advance(problem: Problem, fit: Fit, *, phases: tuple[Phase, ...], base: Weights, judge: Weights) -> Fit:
     """The same fit after some more phases of descent."""
     state, surface, trace = descend(problem, fit.state, fit.surface, phases, base)
     return Fit(fit.start, state, surface, problem.energies(state, judge, surface), fit.trace + trace)

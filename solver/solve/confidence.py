@@ -6,7 +6,7 @@ import numpy as np
 
 from solver.body.skeleton import JOINTS, mirror_index
 from solver.rotations import log_so3
-from solver.solve.problem import Observations
+from solver.solve.state import Observations
 from solver.solve.results import Candidate, Localization, Orientation
 
 _SAME_BONES = 0.8

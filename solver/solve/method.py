@@ -15,7 +15,8 @@ from solver.rotations import log_so3
 from solver.solve.bundle import Fit, relax
 from solver.solve.kinematics import Points, Pose, forward, place_points
 from solver.solve.placement import Skin
-from solver.solve.problem import Camera, Observations, Problem, State, Surface, Weights
+from solver.solve.problem import Problem
+from solver.solve.state import Camera, Observations, State, Surface, Weights
 from solver.solve.refine import every_frame
 from solver.solve.results import CameraResult, Candidate, FittedMotion, Localization, Orientation
 

@@ -9,7 +9,7 @@ from solver.markers import Markers
 from solver.prior import PosePrior
 from solver.rotations import slerp
 from solver.solve.kinematics import Points
-from solver.solve.problem import Observations
+from solver.solve.state import Observations
 from solver.video.landmarks import Landmarks
 from solver.video.lift import landmark_points
 

@@ -9,9 +9,10 @@ from scipy.spatial import cKDTree
 
 from solver.body.model import Body, vertex_normals
 from solver.solve.kinematics import Points
-from solver.solve.problem import Surface
+from solver.solve.state import Surface
 
 _NEIGHBOURS = 4
+_NEGLIGIBLE = 0.02
 
 
 class Skin:
@@ -50,7 +51,11 @@ class Skin:
         dirs = blend(self.body.shape_dirs)
         normal = blend(self.normal)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
-        return Points(placed - dirs @ self.betas, dirs, blend(self.body.weights)), Surface(blend(self.surface), normal)
+        weights = blend(self.body.weights)
+        # Traces of far bones would make every marker depend on many joints and tell nothing.
+        weights[weights < _NEGLIGIBLE] = 0
+        weights /= weights.sum(axis=1, keepdims=True)
+        return Points(placed - dirs @ self.betas, dirs, weights), Surface(blend(self.surface), normal)
 
     def nearest_vertex(self, placed: np.ndarray) -> np.ndarray:
         """(M,) vertex index below each marker."""

@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from solver.body.model import Body
+from solver.parallel import spread
 from solver.progress import Progress, silent
 from solver.rotations import slerp
 from solver.solve.kinematics import Points, Pose, forward, place_points
-from solver.solve.problem import Observations, Problem, State, Surface, Weights
+from solver.solve.problem import Problem
+from solver.solve.state import Observations, State, Surface, Weights
 
-_CHUNK = 256
-_SPREADS = (0.03, 0.02, 0.01, 0.01, 0.01)
+_CHUNK = 128
+_SPREADS = (0.02, 0.01, 0.01, 0.01)
 
 
 def every_frame(
@@ -32,15 +34,18 @@ def every_frame(
     start = carried_over(body, seen, keyframes, fitted)
     held = replace(base, free_shape=False, free_placement=False, free_camera=False)
     rotations, trans = start.rotations.copy(), start.trans.copy()
-    for first in range(0, frames, _CHUNK):
+
+    def solve(first: int) -> None:
         progress(first / frames, "solving every frame")
         part = slice(first, min(first + _CHUNK, frames))
         problem = Problem(body, seen.at(part), landmarks)
         state = replace(fitted, pose=start.at(part))
-        for spread in _SPREADS:
-            weights = replace(held, marker=spread, marker_kernel=4 * spread)
+        for spread_m in _SPREADS:
+            weights = replace(held, marker=spread_m, marker_kernel=4 * spread_m)
             state = problem.step(state, weights, surface, 1e-4)
         rotations[part], trans[part] = state.pose.rotations, state.pose.trans
+
+    spread(solve, range(0, frames, _CHUNK))
     return Pose(rotations, trans, fitted.pose.betas)
 
 

@@ -20,7 +20,8 @@ from solver.progress import Progress, silent
 from solver.rotations import kabsch, slerp
 from solver.solve import anatomical
 from solver.solve.kinematics import Points, Pose
-from solver.solve.problem import Camera, Observations, Problem, State, Surface, Weights
+from solver.solve.problem import Problem
+from solver.solve.state import Camera, Observations, State, Surface, Weights
 from solver.video.landmarks import LANDMARKS, Landmarks
 
 _UNUSED = ("mouth_left", "mouth_right", "left_eye_inner", "right_eye_inner", "left_eye_outer", "right_eye_outer")

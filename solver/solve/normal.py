@@ -1,0 +1,105 @@
+"""The normal equations of a fit, split into what belongs to one frame and what all frames share.
+
+A point moves only with the joints above its bones, so its rows are multiplied over those columns alone; points are
+taken together by limb. The frames are eliminated first (Schur complement), which leaves one small shared system.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from solver.body.skeleton import INDEX, descendants
+from solver.solve.kinematics import Chain, Points, pose_jacobian
+from solver.solve.state import FREE, POSE_SIZE
+
+_NEGLIGIBLE = 1e-3
+_SPINE = ("pelvis", "spine1", "spine2", "spine3")
+_LIMBS = (
+    *(("pelvis", *(f"{s}_{j}" for j in ("hip", "knee", "ankle", "foot"))) for s in ("left", "right")),
+    ("pelvis", "left_hip", "right_hip", "spine1", "spine2"),
+    *((*_SPINE, *(f"{s}_{j}" for j in ("collar", "shoulder", "elbow", "wrist"))) for s in ("left", "right")),
+    (*_SPINE, "neck", "head", "left_collar", "right_collar", "left_shoulder", "right_shoulder"),
+)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Points that move with the same joints: their indices, the joints, and the columns those have per frame."""
+
+    points: np.ndarray
+    joints: np.ndarray
+    columns: np.ndarray
+
+
+@cache
+def _limb_masks() -> np.ndarray:
+    masks = np.zeros((len(_LIMBS) + 1, 24), bool)
+    for i, names in enumerate(_LIMBS):
+        masks[i, [INDEX[name] for name in names]] = True
+    masks[-1, FREE] = True
+    return masks
+
+
+def groups(weights: np.ndarray) -> list[Group]:
+    """Points (P, 24 weights) by the limb whose joints cover all that move them."""
+    needed = ((weights > _NEGLIGIBLE).astype(float) @ descendants().T.astype(float)) > 0
+    needed[:, np.setdiff1d(np.arange(24), FREE)] = False
+    covered = ~(needed[:, None] & ~_limb_masks()[None]).any(axis=2)
+    limb = covered.argmax(axis=1)
+    found = []
+    for i in np.unique(limb):
+        joints = np.flatnonzero(_limb_masks()[i])
+        columns = np.concatenate([(3 * joints[:, None] + np.arange(3)).ravel(), np.arange(POSE_SIZE - 3, POSE_SIZE)])
+        found.append(Group(np.flatnonzero(limb == i), joints, columns))
+    return found
+
+
+class NormalEquations:
+    """Sums of squares over F frames with a shared part of the given size."""
+
+    def __init__(self, frames: int, shared: int) -> None:
+        self.h_ff = np.zeros((frames, POSE_SIZE, POSE_SIZE))
+        self.h_fs = np.zeros((frames, POSE_SIZE, shared))
+        self.h_ss = np.zeros((shared, shared))
+        self.g_f = np.zeros((frames, POSE_SIZE))
+        self.g_s = np.zeros(shared)
+
+    def add_rows(
+        self, columns: np.ndarray, by_pose: np.ndarray, residual: np.ndarray, shared: slice, by_shared: np.ndarray | None
+    ) -> None:
+        """Rows (F, R, C) over some columns of each frame, with their residual (F, R) and shared derivatives (F, R, B)."""
+        transposed = np.swapaxes(by_pose, 1, 2)
+        at = np.ix_(np.arange(len(by_pose)), columns, columns)
+        self.h_ff[at] += transposed @ by_pose
+        self.g_f[:, columns] += (transposed @ residual[..., None])[..., 0]
+        if by_shared is not None:
+            self.h_fs[:, columns, shared] += transposed @ by_shared
+            flat = by_shared.reshape(-1, by_shared.shape[2])
+            self.h_ss[shared, shared] += flat.T @ flat
+            self.g_s[shared] += flat.T @ residual.ravel()
+
+    def solve(self, free: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
+        """Step of each frame (F, 69) and of the shared unknowns; those not ``free`` stay at zero."""
+        diagonal = np.einsum("nii->ni", self.h_ff)
+        diagonal += damping * diagonal + 1e-6
+        shared = np.zeros(len(self.g_s))
+        if not len(free):
+            return -np.linalg.solve(self.h_ff, self.g_f[..., None])[..., 0], shared
+        h_ss = self.h_ss[np.ix_(free, free)]
+        h_ss[np.diag_indices(len(free))] *= 1 + damping
+        h_ss[np.diag_indices(len(free))] += 1e-9
+        cross = np.ascontiguousarray(self.h_fs[:, :, free])
+        solved = np.linalg.solve(self.h_ff, np.concatenate([cross, self.g_f[..., None]], axis=2))
+        stacked = cross.reshape(-1, len(free))
+        reduced = h_ss - stacked.T @ solved[..., :-1].reshape(-1, len(free))
+        slope = self.g_s[free] - stacked.T @ solved[..., -1].ravel()
+        shared[free] = -np.linalg.solve(reduced, slope)
+        return -solved[..., -1] - solved[..., :-1] @ shared[free], shared
+
+
+def group_jacobian(points: Points, group: Group, links: Chain, betas: np.ndarray) -> np.ndarray:
+    """(F, p, 3, C): derivative of a group's points by its own columns."""
+    return pose_jacobian(points.take(group.points), links, betas, group.joints)

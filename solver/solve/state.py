@@ -1,0 +1,149 @@
+"""What a fit is given, what it looks for, and how it weighs the evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.solve.kinematics import Points, Pose
+
+FREE = np.arange(22)
+"""Joints that a fit turns: all but the hands, which neither markers nor landmarks show."""
+POSE_SIZE = 3 * len(FREE) + 3
+CAMERA_SIZE = 7
+
+
+@dataclass(frozen=True)
+class Observations:
+    """What is seen in N frames.
+
+    Attributes
+    ----------
+    markers : (N, M, 3) m, lab frame, NaN = lost
+    prior : (N, 24, 3, 3) pose of the video, root in the camera's frame
+    tracked : (N,) True where the video tracked the person
+    image : (N, L, 2) px of the body landmarks in the video, NaN = not seen
+    visibility : (N, L) 0..1
+    image_size : (width, height) px; (0, 0) without landmarks
+    """
+
+    markers: np.ndarray
+    prior: np.ndarray
+    tracked: np.ndarray
+    image: np.ndarray
+    visibility: np.ndarray
+    image_size: tuple[int, int]
+
+    def at(self, frames: np.ndarray | slice) -> Observations:
+        """Some of the frames."""
+        names = ("markers", "prior", "tracked", "image", "visibility")
+        return replace(self, **{name: getattr(self, name)[frames] for name in names})
+
+    @property
+    def lab_centre(self) -> np.ndarray:
+        """(3,) m, the middle of all markers: the camera turns about it, which keeps the problem well scaled."""
+        return np.nanmean(self.markers.reshape(-1, 3), axis=0)
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera: ``x_cam = R_lab_cam^T (x_lab - centre) + shift``, ``px = focal x / z + middle``.
+
+    Attributes
+    ----------
+    R_lab_cam : (3, 3) turns camera axes (x right, y down, z away) into the lab
+    shift : (3,) m, the point ``centre`` in the camera's frame
+    centre : (3,) m, lab frame
+    focal : px
+    """
+
+    R_lab_cam: np.ndarray
+    shift: np.ndarray
+    centre: np.ndarray
+    focal: float
+
+    def moved_to(self, centre: np.ndarray) -> Camera:
+        """The same camera written about another lab point."""
+        return replace(self, shift=self.shift + (centre - self.centre) @ self.R_lab_cam, centre=centre)
+
+    def to_camera(self, points: np.ndarray) -> np.ndarray:
+        """(..., 3) m, lab to camera frame."""
+        return (points - self.centre) @ self.R_lab_cam + self.shift
+
+    def project(self, points: np.ndarray, image_size: tuple[int, int]) -> np.ndarray:
+        """(..., 3) m in the lab to (..., 2) px."""
+        seen = self.to_camera(points)
+        return self.focal * seen[..., :2] / np.maximum(seen[..., 2:], 0.05) + np.array(image_size) / 2
+
+
+@dataclass(frozen=True)
+class State:
+    """One guess at everything: the pose, where the markers sit, and the camera."""
+
+    pose: Pose
+    placement: Points
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class Weights:
+    """How much each kind of evidence counts, as its spread.
+
+    Attributes
+    ----------
+    marker : m, spread of a marker about its place on the skin
+    marker_kernel : m, beyond this a marker counts as an outlier (Geman-McClure)
+    prior_deg : spread of the video's joint rotations
+    root_deg : spread of the video's root rotation, once the camera is turned right
+    anatomical : share of the anatomical prior
+    image : spread of a 2D landmark as a share of the person's height in the image
+    shape : strength of the prior on betas and bone lengths, per frame of evidence
+    offset, offset_spread : m, marker centre above the skin (9.5 mm: Ghorbani and Black 2021)
+    slide : m, how far a marker may slide over the skin in one step
+    focal_spread : natural logarithm of the focal length
+    free_focal, free_camera : False holds the camera's focal length, or all of it
+    """
+
+    marker: float = 0.01
+    marker_kernel: float = 0.03
+    prior_deg: float = 15.0
+    root_deg: float = 12.0
+    anatomical: float = 0.3
+    image: float = 0.025
+    image_kernel: float = 3.0
+    shape: float = 0.25
+    offset: float = 0.0095
+    offset_spread: float = 0.002
+    slide: float = 0.02
+    focal_guess: float = 0.85
+    focal_spread: float = 0.25
+    free_focal: bool = True
+    free_camera: bool = True
+    free_shape: bool = True
+    free_placement: bool = True
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The rest surface about each marker: what its placement is held to. All (M, ...)."""
+
+    point: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True)
+class Energies:
+    """The cost of a state by kind of evidence, each per frame."""
+
+    markers: float
+    prior: float
+    anatomical: float
+    image: float
+    shape: float
+    placement: float
+
+    @property
+    def total(self) -> float:
+        """Sum of all kinds."""
+        return self.markers + self.prior + self.anatomical + self.image + self.shape + self.placement
