@@ -1,0 +1,126 @@
+"""Text files as people really have them: any line end, any common encoding, several separators."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from solver.errors import InputError
+
+SEPARATORS = "\t;,"
+_LOST = {"", "nan", "na", "n/a", "null", "none", "-", "--", "."}
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """The whole file, or the sentence that says why it cannot be read."""
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError as error:
+        raise InputError("there is no such file", path, "check the name") from error
+    except IsADirectoryError as error:
+        raise InputError("is a folder, not a file", path, "name a file in it") from error
+    except PermissionError as error:
+        if path.is_dir():  # what Windows says of a folder
+            raise InputError("is a folder, not a file", path, "name a file in it") from error
+        raise InputError("may not be read by this user", path, "change its permissions") from error
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"cannot be read: {reason}", path, "check the name and the disk") from error
+    if not data:
+        raise InputError("the file is empty", path, "export or copy it again")
+    return data
+
+
+def decode(data: bytes, path: str | Path) -> str:
+    """Text of ``data``: UTF-8 or UTF-16 by byte order mark, UTF-8, else Western 8-bit."""
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        text = data.decode("utf-16", errors="replace")
+    else:
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = data.decode("latin-1")
+    sample = text[:20000]
+    if "\0" in text or sum(c < " " and c not in "\t\n\r\f\v" for c in sample) > 0.02 * len(sample):
+        raise InputError("is binary data, not a text table", path, "export the markers as C3D, TRC, CSV or TSV")
+    return text
+
+
+def split_lines(text: str) -> list[str]:
+    """Lines without their ends, whichever of the three ends they have."""
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def split_cells(line: str) -> list[str]:
+    """Cells of one line, parted by tabs, else semicolons, else commas, else runs of blanks; each one trimmed."""
+    for separator in SEPARATORS:
+        if separator in line:
+            break
+    else:
+        return line.split()
+    if '"' in line:
+        try:
+            return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+        except (csv.Error, StopIteration):
+            pass
+    return [cell.strip() for cell in line.split(separator)]
+
+
+def refuse_ragged_blanks(line: str, cells: list[str], rows: list[list[str]], at: int, path: str | Path) -> None:
+    """Rows parted by mere blanks must all be of one length, or a lost value would shift those behind it."""
+    if rows and len(cells) != len(rows[0]) and not any(separator in line for separator in SEPARATORS):
+        what = f"line {at} has {len(cells)} values parted by blanks where the first row has {len(rows[0])}"
+        raise InputError(what, path, "export it with tabs or commas, so that lost markers leave empty cells")
+
+
+def number(cell: str) -> float:
+    """Value of one cell, NaN where it says that there is none. Raises ValueError."""
+    try:
+        return float(cell)
+    except ValueError:
+        cell = cell.strip(" \"'")
+        if cell.lower() in _LOST:
+            return float("nan")
+        if _DECIMAL_COMMA.fullmatch(cell):
+            cell = cell.replace(",", ".")
+        return float(cell)
+
+
+def is_number(cell: str) -> bool:
+    """True where the cell holds a value (a blank holds none)."""
+    try:
+        number(cell)
+    except ValueError:
+        return False
+    return cell != ""
+
+
+def number_table(rows: Sequence[Sequence[str]], line_numbers: Sequence[int], path: str | Path) -> np.ndarray:
+    """Rows of cells as an array, short rows padded with NaN.
+
+    Raises
+    ------
+    InputError : a cell holds something else than a number, with its line
+    """
+    width = max(map(len, rows), default=0)
+    table = np.full((len(rows), width), np.nan)
+    for i, row in enumerate(rows):
+        try:
+            table[i, : len(row)] = [float(c) if c else np.nan for c in row]
+        except ValueError:
+            table[i, : len(row)] = [_number_or_refuse(c, line_numbers[i], path) for c in row]
+    return table
+
+
+def _number_or_refuse(cell: str, line: int, path: str | Path) -> float:
+    try:
+        return number(cell)
+    except ValueError as error:
+        shown = cell if len(cell) <= 20 else cell[:20] + "..."
+        raise InputError(f"line {line} holds {shown!r} where a number is expected", path, "export it again") from error
