@@ -65,10 +65,9 @@ def load_markers(
         metres = positions * factor
     R_lab_internal, up_notes = settle_up(metres, raw, up)
     metres = _lost_as_nan(metres @ R_lab_internal)
-    labels = unique([without_prefix(label) if prefix(label) else label for label in raw.labels])
-    unseen = [
-        label for label, seen in zip(labels, np.isfinite(metres).all(axis=2).any(axis=0), strict=True) if not seen
-    ]
+    labels = unique([without_prefix(label) for label in raw.labels])
+    present = np.isfinite(metres).all(axis=2)
+    unseen = [labels[m] for m in np.flatnonzero(~present.any(axis=0))]
     seen_notes = (f"Never seen: {_some(unseen)}.",) if unseen else ()
     return Markers(
         positions=metres,
@@ -76,7 +75,7 @@ def load_markers(
         labels=labels,
         first_time=raw.first_frame / rate if raw.first_time is None else raw.first_time,
         R_lab_internal=R_lab_internal,
-        filled=None if raw.filled is None else raw.filled & np.isfinite(metres).all(axis=2),
+        filled=None if raw.filled is None else raw.filled & present,
         source=str(path),
         notes=(*raw.notes, *rate_notes, *unit_notes, *up_notes, *seen_notes),
     )
