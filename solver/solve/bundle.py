@@ -27,7 +27,11 @@ NOWHERE = Points(np.zeros((0, 3)), np.zeros((0, 3, 0)), np.zeros((0, 24)))
 
 @dataclass(frozen=True)
 class Phase:
-    """One stretch of the descent: how coarse markers are taken, how often they choose a new place, how many steps."""
+    """One stretch of the descent: how coarse markers are taken, whether they choose a new place first, how many steps.
+
+    While markers sit on whole vertices their errors are the same in every frame, so the video's pose must hold against
+    them: ``prior`` scales its spread.
+    """
 
     marker: float
     kernel: float
@@ -35,12 +39,13 @@ class Phase:
     reassign: bool = False
     free_placement: bool = False
     free_shape: bool = True
+    prior: float = 1.0
 
 
 COARSE = (
-    Phase(0.04, 0.16, 3, free_shape=False),
-    Phase(0.03, 0.12, 3, reassign=True),
-    Phase(0.025, 0.10, 3, reassign=True),
+    Phase(0.04, 0.16, 3, free_shape=False, prior=0.5),
+    Phase(0.03, 0.12, 3, reassign=True, prior=0.5),
+    Phase(0.025, 0.10, 3, reassign=True, prior=0.5),
 )
 FINE = (
     Phase(0.02, 0.08, 3, reassign=True, free_placement=True),
@@ -137,6 +142,8 @@ def phase_weights(base: Weights, phase: Phase) -> Weights:
         base,
         marker=phase.marker,
         marker_kernel=phase.kernel,
+        prior_deg=base.prior_deg * phase.prior,
+        root_deg=base.root_deg * phase.prior,
         free_placement=phase.free_placement,
         free_shape=base.free_shape and phase.free_shape,
     )
