@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -67,6 +68,16 @@ def test_the_walls_would_be_seen(tmp_path: Path) -> None:
 def test_no_module_of_the_solver_imports_heavy_libraries_at_its_start() -> None:
     wrong = {str(p.relative_to(ROOT)): found for p in modules("solver") if (found := imported(p, True) & HEAVY)}
     assert not wrong
+
+
+def test_the_map_in_the_readme_is_true() -> None:
+    chapter = (ROOT / "README.md").read_text(encoding="utf-8").split("## Architecture")[1].split("\n## ")[0]
+    named = set(re.findall(r"`([\w/]+/|[\w/]+\.py)`", chapter))
+    assert not {name for name in named if not (ROOT / name).exists()}
+    rooms = {f"{path.relative_to(ROOT)}/" for path in ROOT.glob("[a-z]*/") if any(path.rglob("*.py"))}
+    parts = {f"{path.relative_to(ROOT)}/" for path in ROOT.glob("solver/[a-z]*/") if any(path.glob("*.py"))}
+    assert named >= rooms - {"solver/", "build/", "benchmarks/"}
+    assert named >= parts - {"solver/clean/"}
 
 
 def loaded_by(statements: str) -> set[str]:
