@@ -438,8 +438,9 @@ def test_garbage_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, da
 
 
 def test_missing_empty_and_foreign_files_say_what_is_wrong(tmp_path: Path) -> None:
-    torch = pytest.importorskip("torch")
-    torch.jit.save(torch.jit.script(torch.nn.Linear(2, 1)), tmp_path / "program.pt")
+    with zipfile.ZipFile(tmp_path / "program.pt", "w") as archive:
+        for name in ("data.pkl", "constants.pkl", "code/__torch__.py"):
+            archive.writestr(f"program/{name}", b"\x80\x02N.")
     for path, sentence in (
         (tmp_path / "nowhere.pkl", "no such file"),
         (tmp_path, "cannot be read"),

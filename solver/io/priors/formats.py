@@ -171,6 +171,6 @@ def _frames(ids: Any, name: str, count: int, where: str) -> np.ndarray:
     if ids is None:
         return np.arange(count)
     frames = numbers(np.asarray(ids) if isinstance(ids, list) else ids, name, where).ravel()
-    if len(frames) != count or not np.isfinite(frames).all():
+    if len(frames) != count or not (np.abs(frames) < 2**31).all():
         raise InputError(f"its field '{name}' has {len(frames)} entries for {count} poses", where, _AGAIN)
     return frames.astype(np.int64)
