@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import io
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -72,8 +71,10 @@ def check(page: str) -> Checker:
 
 
 def pixels(address: str) -> np.ndarray:
-    image = pytest.importorskip("PIL.Image")
-    return np.array(image.open(io.BytesIO(base64.b64decode(address.partition(",")[2]))))
+    import cv2
+
+    data = np.frombuffer(base64.b64decode(address.partition(",")[2]), np.uint8)
+    return cv2.cvtColor(cv2.imdecode(data, cv2.IMREAD_UNCHANGED), cv2.COLOR_BGRA2RGBA)
 
 
 def full(count: int = 9, frames: int = 120) -> ReportData:
