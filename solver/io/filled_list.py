@@ -48,14 +48,17 @@ def apply_filled_list(raw: RawMarkers, path: str | Path) -> RawMarkers:
     target = filled_list_path(path)
     if not target.is_file():
         return raw
-    filled = np.zeros(raw.positions.shape[:2], dtype=bool)
+    frames, markers = raw.positions.shape[:2]
+    filled = np.zeros((frames, markers), dtype=bool)
     fits = False
     with suppress(InputError, ValueError):
         title, *lines = split_lines(decode(read_bytes(target), target))
-        spans = np.array([line.split(",") for line in lines if line.strip()], dtype=int).reshape(-1, 3).tolist()
-        fits = title == _TITLE and all(1 <= m <= filled.shape[1] and 1 <= a <= b <= len(filled) for m, a, b in spans)
-        for m, a, b in spans if fits else ():
-            filled[a - 1 : b, m - 1] = True
+        spans = [[int(cell) for cell in line.split(",")] for line in lines if line.strip()]
+        fits = title == _TITLE and all(
+            len(s) == 3 and 1 <= s[0] <= markers and 1 <= s[1] <= s[2] <= frames for s in spans
+        )
+        for marker, first, last in spans if fits else []:
+            filled[first - 1 : last, marker - 1] = True
     if not fits:
         return replace(raw, notes=(*raw.notes, f"{target.name} does not fit the file and was left aside."))
     return replace(raw, filled=filled)
