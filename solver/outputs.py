@@ -75,7 +75,7 @@ def _write(folder: Path, session: Session, graph: GraphRun) -> None:
     turned = motion.rotations.copy()
     turned[:, 0] = up @ turned[:, 0]
     write_bvh(folder / "motion.bvh", JOINTS, PARENTS, offsets, turned, motion.joints[:, 0] @ up.T, markers.rate)
-    report_of(folder / "report.html", session, graph, about)
+    report_of(folder / "report.html", session, graph, named, about)
 
 
 def write_motion(path: Path, markers: Markers, motion: FittedMotion, betas_count: int) -> None:

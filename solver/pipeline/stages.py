@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -80,12 +80,12 @@ class SyncSettings:
     ----------
     offset : s; None finds it from the motion
     rate_ratio : None takes 1, unless the motion clearly says otherwise
-    search_s : how far to look to either side
+    search_s : how far to look to either side of zero; None goes by the lengths of the recordings
     """
 
     offset: float | None = None
     rate_ratio: float | None = None
-    search_s: float = 2.0
+    search_s: float | None = None
 
 
 def _markers(given: Mapping[str, Any], settings: MarkerSettings, progress: Progress) -> Markers:
@@ -123,18 +123,22 @@ def _prior(given: Mapping[str, Any], settings: PriorSettings, progress: Progress
 
 
 def _sync(given: Mapping[str, Any], settings: SyncSettings, progress: Progress) -> Sync:
-    from solver.sync import find_offset, given_offset
+    from solver.sync import find_offset
 
     if settings.offset is not None:
-        return given_offset(settings.offset, settings.rate_ratio or 1.0)
+        lags, score = np.array([settings.offset]), np.array([np.nan])
+        return Sync(settings.offset, settings.rate_ratio or 1.0, 1.0, lags, score, method="given")
     watched = given["landmarks"]
     if watched is None:
         from solver.body.model import Body
         from solver.video.shadow import landmarks_of_prior
 
         watched = landmarks_of_prior(given["prior"], Body.load())
-    window = (-settings.search_s, settings.search_s)
-    return find_offset(watched, given["markers"], search=window, rate_ratio=settings.rate_ratio)
+    if settings.rate_ratio is not None:
+        watched = replace(watched, time=watched.time * settings.rate_ratio)
+    window = None if settings.search_s is None else (-settings.search_s, settings.search_s)
+    found = find_offset(watched, given["markers"], search=window)
+    return found if settings.rate_ratio is None else replace(found, rate_ratio=found.rate_ratio * settings.rate_ratio)
 
 
 def _segment(given: Mapping[str, Any], settings: SegmentSettings, progress: Progress) -> Segmentation:

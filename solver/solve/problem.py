@@ -75,6 +75,11 @@ class Problem:
 
     def step(self, state: State, weights: Weights, surface: Surface, damping: float) -> State:
         """One damped Gauss-Newton step of everything that is free."""
+        sums = self.linearised(state, weights, surface)
+        return self._moved(state, *sums.solve(self._free(weights), damping))
+
+    def linearised(self, state: State, weights: Weights, surface: Surface) -> NormalEquations:
+        """The normal equations at a state; their slope is half that of the cost summed over frames."""
         sums = NormalEquations(len(self.target), self.placement_at.stop)
         links = forward(self.body, state.pose)
         self._add_markers(sums, state, links, weights)
@@ -82,7 +87,7 @@ class Problem:
             self._add_image(sums, state, links, weights)
         self._add_joints(sums, state, weights)
         self._add_shared(sums, state, surface, weights)
-        return self._moved(state, *sums.solve(self._free(weights), damping))
+        return sums
 
     def reprojection(self, state: State) -> float:
         """Median distance in px of the landmarks from where the body puts them; NaN where there are none."""

@@ -1,0 +1,147 @@
+"""The report of a solve: the stages' results turned into what a report shows."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from solver.angles import JointAngles
+from solver.body.skeleton import BONES, JOINTS
+from solver.markers import Markers
+from solver.pipeline.session import Session
+from solver.pipeline.stage import GraphRun
+from solver.report import write_report
+from solver.report_data import (
+    AngleCurve,
+    Gaps,
+    Groups,
+    Headline,
+    Hypothesis,
+    InputFile,
+    ReportData,
+    Stage,
+    marker_residuals,
+)
+from solver.segment import Segmentation
+from solver.solve.results import FittedMotion, Orientation
+
+_ROLES = {
+    "marker_file": "markers",
+    "video_file": "video",
+    "prior_file": "pose prior",
+    "camera_file": "camera",
+    "body_file": "body",
+}
+_LIBRARIES = ("numpy", "scipy", "open3d-cpu", "open3d", "ai-edge-litert", "av", "ezc3d")
+
+
+def report_of(path: Path, session: Session, graph: GraphRun, named: Markers, about: Mapping[str, Any]) -> None:
+    """Write the report of one solve.
+
+    Parameters
+    ----------
+    named : the labelled markers, in the order of the file's
+    about : provenance: program, inputs with digests, stages with settings
+    """
+    write_report(path, _data(session, graph, named, about))
+
+
+def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str, Any]) -> ReportData:
+    markers, motion, ranked, sync = graph["markers"], graph["fit"], graph["orient"], graph["sync"]
+    notes = {"marker_file": markers.notes, "prior_file": graph["prior"].notes}
+    inputs = tuple(
+        InputFile(_ROLES.get(name, name), row["file"], row["sha256"], tuple(notes.get(name, ())))
+        for name, row in about["inputs"].items()
+    )
+    bones = tuple("" if j < 0 else BONES[JOINTS[j]].replace("_", " ") for j in motion.marker_joint)
+    stages = tuple(
+        Stage(
+            name,
+            {key: _said(value) for key, value in row["settings"].items()},
+            graph.events[name].seconds if graph.events[name].computed else None,
+        )
+        for name, row in about["stages"].items()
+    )
+    marker_file = session.inputs["marker_file"].path
+    return ReportData(
+        title=marker_file.stem,
+        subtitle=f"{ranked.candidates[motion.chosen].part}, {len(motion.time)} frames at {markers.rate:g} Hz",
+        headlines=_headlines(graph, motion, ranked),
+        warnings=(*sync.notes, *motion.warnings),
+        inputs=inputs,
+        groups=_groups(markers, graph["segment"]),
+        hypotheses=_hypotheses(ranked, motion),
+        margin=ranked.margin,
+        angles=_curves(graph["angles"]),
+        zero_pose=graph["angles"].zero_pose,
+        residuals=marker_residuals(named.labels, markers.labels, bones, motion.residual, markers.present, motion.time),
+        gaps=Gaps(named.labels, motion.time, markers.present, named.filled),
+        stages=stages,
+        versions=_versions(about),
+    )
+
+
+def _headlines(graph: GraphRun, motion: FittedMotion, ranked: Orientation) -> tuple[Headline, ...]:
+    sync, surface = graph["sync"], graph["surface"]
+    margin = f"next answer costs {ranked.margin:.2f} times" if np.isfinite(ranked.margin) else "no other answer found"
+    camera = motion.camera
+    rows = [
+        Headline("Confidence", f"{100 * motion.confidence:.0f} %", margin),
+        Headline("Marker residual", f"{1000 * np.nanmedian(motion.residual):.1f} mm", "median distance from its place"),
+        Headline("Marker to skin", f"{1000 * surface.mean:.1f} mm", "mean; a marker's centre stands some 9.5 mm off"),
+        Headline("Sync offset", f"{sync.offset:+.3f} s", f"added to the video's time; confidence {sync.confidence:.2f}"),
+    ]
+    if np.isfinite(camera.reprojection_px):
+        rows.append(Headline("Reprojection", f"{camera.reprojection_px:.0f} px", "median distance of the video's landmarks"))
+    return tuple(rows)
+
+
+def _groups(markers: Markers, found: Segmentation) -> Groups:
+    return Groups(
+        markers.labels, found.affinity, found.measured, found.linkage, found.leaves, found.order, found.cut, found.clusters
+    )
+
+
+def _hypotheses(ranked: Orientation, motion: FittedMotion) -> tuple[Hypothesis, ...]:
+    return tuple(
+        Hypothesis(c.part, c.heading_deg, c.energy, c.energies, c.refined, i == motion.chosen, i == ranked.runner_up)
+        for i, c in enumerate(ranked.candidates)
+    )
+
+
+def _curves(angles: JointAngles) -> tuple[AngleCurve, ...]:
+    """One curve per angle, left and right together."""
+    columns: dict[str, dict[str, int]] = {}
+    for i, name in enumerate(angles.names):
+        title, side = name, ""
+        for end, meaning in (("_r", "right"), ("_l", "left"), ("Right", "right"), ("Left", "left")):
+            if name.endswith(end):
+                title, side = name.removesuffix(end), meaning
+        columns.setdefault(title, {})[side] = i
+    curves = []
+    for title, sides in columns.items():
+        values = {side: np.where(angles.singular[:, i], np.nan, angles.degrees[:, i]) for side, i in sides.items()}
+        if not any(np.isfinite(v).any() for v in values.values()):
+            continue
+        flagged = np.any([angles.singular[:, i] for i in sides.values()], axis=0)
+        words = title.replace("_", " ")
+        curves.append(AngleCurve(words[:1].upper() + words[1:], "degrees", angles.time, values, flagged))
+    return tuple(curves)
+
+
+def _said(value: Any) -> str:
+    return "as found" if value is None else str(value)
+
+
+def _versions(about: Mapping[str, Any]) -> dict[str, str]:
+    found = {"program": str(about["program"]).removeprefix("markerscope ")}
+    for name in _LIBRARIES:
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found
