@@ -31,19 +31,25 @@ def main(arguments: Sequence[str] | None = None, services: Services = SERVICES) 
         with suppress(AttributeError):  # a terminal that cannot show a character shows its code instead
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     words = _attach_negative_values(sys.argv[1:] if arguments is None else list(arguments))
-    debug = "--debug" in words
     try:
-        if not words or (words[0] not in COMMANDS and not words[0].startswith("-")):
-            return _no_window(words)
-        options = _parser().parse_args(words)
-        return int(options.run(options, services))
-    except SystemExit as error:
-        return int(error.code or 0)
+        code = _run(words, services)
+        sys.stdout.flush()  # here, where a reader that has left can still be told from a mistake
+        return code
     except KeyboardInterrupt:
         print("Cancelled.", file=sys.stderr)
         return CANCELLED
     except Exception as error:
-        return ended(error, debug)
+        return ended(error, debug="--debug" in words)
+
+
+def _run(words: list[str], services: Services) -> int:
+    if not words or (words[0] not in COMMANDS and not words[0].startswith("-")):
+        return _no_window(words)
+    try:
+        options = _parser().parse_args(words)
+    except SystemExit as error:  # --help, or a wrong word that has been told
+        return int(error.code or 0)
+    return int(options.run(options, services))
 
 
 class _Parser(argparse.ArgumentParser):

@@ -38,7 +38,7 @@ def ended(error: Exception, debug: bool = False) -> int:
 
 
 def _say(sentence: str, code: int) -> int:
-    print(" ".join(sentence.split()), file=sys.stderr)
+    print(" ".join(sentence.splitlines()), file=sys.stderr)
     return code
 
 

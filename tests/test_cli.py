@@ -267,6 +267,23 @@ def test_control_c_ends_a_real_run(markers: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="pipes end otherwise elsewhere")
+def test_a_reader_that_leaves_ends_the_command_without_a_word(markers: Path) -> None:
+    root = Path(__file__).parents[1]
+    code = (
+        "import sys; from app.cli import main; from app.cli_commands import Services\n"
+        "from solver.pipeline.request import Outcome\n"
+        "services = Services(evaluate=lambda request, progress: Outcome(summary={}, lines=('MPJPE 12 mm.',)))\n"
+        f"sys.exit(main(['evaluate', {str(markers)!r}, {str(markers)!r}, '--json'], services))"
+    )
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "w") as pipe:
+        run = subprocess.run([sys.executable, "-c", code], cwd=root, stdout=pipe, stderr=-1, text=True)
+    assert run.stderr == ""
+    assert run.returncode == 1
+
+
 class Screen(io.StringIO):
     def __init__(self, live: bool) -> None:
         super().__init__()
