@@ -25,7 +25,7 @@ def write_markers_csv(
 ) -> None:
     """Write trajectories as CSV: ``time`` in s, then ``NAME_x, NAME_y, NAME_z`` of each marker; lost = empty.
 
-    A remark line before the titles says unit, vertical axis and rate (pandas: ``comment="#"``). A marker with
+    A remark line before the titles says unit, vertical axis, rate and length (pandas: ``comment="#"``). A marker with
     filled positions has a further column ``NAME_filled`` of 0 and 1. ``load_markers`` reads all of it back.
 
     Parameters
@@ -43,19 +43,19 @@ def write_markers_csv(
     names = unique(markers.labels if labels is None else labels, clean=_clean)
     positions, vertical = in_file_axes(markers, up)
     scale, digits = (1, 7) if units == "m" else (1000, 4)
-    lost = np.asarray(~np.isfinite(positions).all(axis=2))
-    filled = np.asarray(np.zeros_like(lost) if markers.filled is None else markers.filled & ~lost)
-    flagged = filled.any(axis=0)
+    lost = ~np.isfinite(positions).all(axis=2)
+    filled = np.zeros(lost.shape, dtype=bool) if markers.filled is None else markers.filled & ~lost
+    flagged = set(np.flatnonzero(filled.any(axis=0)).tolist())
     titles = ["time"]
     columns: list[list[str]] = [[f"{t:.9g}" for t in markers.time.tolist()]]
     for m, name in enumerate(names):
         titles += [f"{name}_{axis}" for axis in "xyz"]
         values = np.where(lost[:, m, None], np.nan, positions[:, m] * scale).T.tolist()
         columns += [[f"{v:.{digits}f}" if v == v else "" for v in column] for column in values]
-        if flagged[m]:
+        if m in flagged:
             titles.append(f"{name}_filled")
             columns.append([str(int(flag)) for flag in filled[:, m]])
-    remark = f"# units={units}; up={vertical}; rate={markers.rate:.10g}"
+    remark = f"# units={units}; up={vertical}; rate={markers.rate:.10g}; frames={len(positions)}"
     write_text_atomic(path, "\n".join([remark, ",".join(titles), *map(",".join, zip(*columns))]) + "\n")
 
 

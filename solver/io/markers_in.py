@@ -23,6 +23,7 @@ from solver.markers import Markers, UpAxis
 _NO_VALUE = 9999999.0  # what some programs write where there is none
 
 
+@np.errstate(all="ignore")  # a damaged number becomes a lost position, not a warning
 def load_markers(
     path: str | Path,
     *,
@@ -61,8 +62,7 @@ def load_markers(
         raise InputError("has no frames", path, "export the marker trajectories again")
     rate, rate_notes = _settle_rate(raw.rate, rate, path)
     factor, unit_notes = settle_units(positions, raw.units, units, str(path))
-    with np.errstate(over="ignore", invalid="ignore"):
-        metres = positions * factor
+    metres = positions * factor
     R_lab_internal, up_notes = settle_up(metres, raw, up)
     metres = _lost_as_nan(metres @ R_lab_internal)
     labels = unique([without_prefix(label) for label in raw.labels])
@@ -87,6 +87,7 @@ def list_subjects(path: str | Path) -> tuple[str, ...]:
     return subjects_of(raw.labels, raw.subjects)
 
 
+@np.errstate(all="ignore")
 def _read(path: str | Path) -> RawMarkers:
     data = read_bytes(path)
     suffix = Path(path).suffix.lower()
@@ -145,8 +146,7 @@ def _select(raw: RawMarkers, keep: np.ndarray) -> RawMarkers:
 
 def _lost_as_nan(positions: np.ndarray) -> np.ndarray:
     """A position is whole or lost: exact zeros, infinities and the customary 9999999 are lost."""
-    with np.errstate(invalid="ignore"):
-        odd = ~np.isfinite(positions).all(axis=2) | (np.abs(positions) >= _NO_VALUE).any(axis=2)
+    odd = ~np.isfinite(positions).all(axis=2) | (np.abs(positions) >= _NO_VALUE).any(axis=2)
     return np.where((odd | (positions == 0).all(axis=2))[..., None], np.nan, positions)
 
 

@@ -44,9 +44,12 @@ def read_table(path: str | Path, text: str | None = None) -> RawMarkers:
     sheet = _cut(lines, path)
     if not sheet.rows:
         raise InputError("has no rows of numbers", path, "export the marker trajectories again")
-    half_line = bool(lines[-1].strip()) and sheet.numbers[-1] == len(lines)  # it has no end: it may be cut
-    if half_line and len(sheet.rows) > 1 and len(sheet.rows[-1]) < max(map(len, sheet.rows[:-1])):
-        raise InputError(f"is cut off in line {len(lines)}", path, "copy or export it again")
+    if lines[-1].strip() and sheet.numbers[-1] == len(lines):  # the last line has no end, so that it may be half a line
+        if len(sheet.rows) < _promised(sheet):
+            what = f"is cut off after frame {len(sheet.rows)} of {_promised(sheet)}"
+            raise InputError(what, path, "copy or export it again")
+        if len(sheet.rows) > 1 and len(sheet.rows[-1]) < max(map(len, sheet.rows[:-1])):
+            raise InputError(f"is cut off in line {len(lines)}", path, "copy or export it again")
     columns = _qualisys_columns(sheet) if sheet.names else find_columns(sheet.header)
     if columns is None:
         remedy = "name the columns like C7_x, C7_y, C7_z, or put a row of names above a row of X, Y, Z"
@@ -67,16 +70,15 @@ def _read(sheet: _Sheet, columns: Columns, path: str | Path) -> RawMarkers:
     time = None if columns.time is None else wide[:, columns.time] * columns.time_scale
     frame = None if columns.frame is None else wide[:, columns.frame]
     line = even_grid(time, frame, _rate(sheet.facts))
-    index = line.index if len(line.index) else np.arange(len(table))
     notes: tuple[str, ...] = ()
     if columns.left_out:
         shown = ", ".join(columns.left_out[:5]) + ("..." if len(columns.left_out) > 5 else "")
         notes = (f"Columns that are no marker coordinates were left out: {shown}.",)
-    if (promised := _fact(sheet.facts, "no_of_frames")) and int(promised) != len(table):
-        notes += (f"The header promises {int(promised)} frames; the file holds {len(table)}.",)
-    grid = type(line)(index, line.rate, line.first_time)
+    promised = _promised(sheet)
+    if promised and promised != len(table):
+        notes += (f"The header promises {promised} frames; the file holds {len(table)}.",)
     return RawMarkers(
-        positions=grid.spread(positions),
+        positions=line.spread(positions),
         labels=columns.names,
         rate=line.rate,
         first_time=line.first_time,
@@ -84,7 +86,7 @@ def _read(sheet: _Sheet, columns: Columns, path: str | Path) -> RawMarkers:
         units=columns.units or sheet.facts.get("units") or sheet.facts.get("length units"),
         up=_up(sheet.facts),
         usual_up="y" if "format version" in sheet.facts else None,
-        filled=grid.spread(filled) if columns.filled else None,
+        filled=line.spread(filled) if columns.filled else None,
         notes=notes + line.notes,
     )
 
@@ -148,6 +150,11 @@ def _fact(facts: dict[str, str], key: str) -> float | None:
     except ValueError:
         return None
     return value if 0 < value < 1e9 else None
+
+
+def _promised(sheet: _Sheet) -> int:
+    """Number of frames that the header names, 0 where it names none."""
+    return int(_fact(sheet.facts, "no_of_frames") or _fact(sheet.facts, "frames") or 0)
 
 
 def _rate(facts: dict[str, str]) -> float | None:

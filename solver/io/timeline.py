@@ -28,7 +28,7 @@ class Timeline:
 
     def spread(self, values: np.ndarray) -> np.ndarray:
         """Rows (rows, ...) laid out on the grid (T, ...); frames without a row are NaN (False for flags)."""
-        if len(values) == 0 or self.index[-1] == len(values) - 1:
+        if len(self.index) == 0 or self.index[-1] == len(values) - 1:
             return values
         blank = np.zeros if values.dtype == bool else lambda shape: np.full(shape, np.nan)
         grid = blank((int(self.index[-1]) + 1, *values.shape[1:]))
