@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from solver.errors import InputError
-from solver.io.atomic import make_folder, write_text_atomic
+from solver.io.atomic import write_text_atomic
 
 KEY_LENGTH = 32
 """Hexadecimal digits of a result's key: 128 bits, short enough for every file system."""
@@ -117,8 +117,7 @@ class DigestCache:
         return value
 
     def save(self) -> None:
-        """Write what was learned, if anything."""
-        if self._changed:
-            make_folder(self._path.parent)
+        """Write what was learned, if anything, and if its folder is there: a refused input must not make one."""
+        if self._changed and self._path.parent.is_dir():
             write_text_atomic(self._path, json.dumps(self._known, indent=1, sort_keys=True) + "\n")
             self._changed = False

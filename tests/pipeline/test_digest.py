@@ -77,14 +77,24 @@ def test_the_cache_reads_a_file_once_and_again_when_it_changed(tmp_path: Path, m
     monkeypatch.setattr(digest_module, "file_digest", lambda p: read.append(p) or file_digest(p))
     path.write_bytes(b"one")
     os.utime(path, ns=(10**18, 10**18))
-    cache = DigestCache(tmp_path / "sub" / "cache.json")
+    cache = DigestCache(tmp_path / "cache.json")
     first = cache.digest(path)
     cache.save()
-    assert DigestCache(tmp_path / "sub" / "cache.json").digest(path) == first
+    assert DigestCache(tmp_path / "cache.json").digest(path) == first
     assert len(read) == 1
     path.write_bytes(b"two")
     os.utime(path, ns=(10**18 + 1000, 10**18 + 1000))
     assert cache.digest(path) == file_digest(path) != first
+
+
+def test_remembering_makes_no_folder(tmp_path: Path) -> None:
+    path = tmp_path / "markers"
+    path.write_bytes(b"one")
+    os.utime(path, ns=(10**18, 10**18))
+    cache = DigestCache(tmp_path / "sub" / "cache.json")
+    cache.digest(path)
+    cache.save()
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_file_that_just_changed_is_not_remembered(tmp_path: Path) -> None:
