@@ -15,7 +15,7 @@ from solver import __version__
 from solver.errors import InputError
 from solver.io.atomic import make_folder, write_text_atomic
 from solver.pipeline.digest import DigestCache
-from solver.pipeline.settings import from_table, to_table
+from solver.pipeline.settings import from_table, overlay, to_table
 from solver.pipeline.stage import Source, Stage
 from solver.pipeline.store import Store
 
@@ -73,7 +73,7 @@ class Session:
                 raise InputError(
                     f'settings for an unknown stage "{name}"', where, f"use one of: {', '.join(sorted(known))}"
                 )
-        tables = {name: {**self.settings.get(name, {}), **self.edits.get(name, {})} for name in known}
+        tables = {name: overlay(self.settings.get(name, {}), self.edits.get(name, {})) for name in known}
         return {stage.name: from_table(stage.settings, tables[stage.name], f"{where}, {stage.name}") for stage in graph}
 
     def sources(self, names: Sequence[str]) -> dict[str, Source]:

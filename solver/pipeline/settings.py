@@ -51,6 +51,14 @@ def from_table(cls: type, table: Mapping[str, Any], where: str = "settings") -> 
         raise InputError(f"cannot be used: {error}", where, "correct the value or delete the line") from error
 
 
+def overlay(table: Mapping[str, Any], over: Mapping[str, Any], where: str = "settings") -> dict[str, Any]:
+    """``table`` with what ``over`` says, be it a value or that there is none."""
+    unset = [name for name in _names(table.get(UNSET, []), where) if name not in over]
+    unset += [name for name in _names(over.get(UNSET, []), where) if name not in unset]
+    merged = {name: value for name, value in {**table, **over}.items() if name not in (UNSET, *unset)}
+    return merged | ({UNSET: unset} if unset else {})
+
+
 def _names(value: Any, where: str) -> list[str]:
     if not (isinstance(value, list) and all(isinstance(name, str) for name in value)):
         raise InputError(f'"{UNSET}" is not a list of names', where, "correct it or delete the line")

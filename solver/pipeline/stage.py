@@ -159,6 +159,7 @@ def run_graph(
     keys = stage_keys(graph, sources, settings)
     runner = _Runner({stage.name: stage for stage in graph}, keys, sources, settings, store, progress, on_event)
     wanted = [name for name in keys if until is None or name in until]
+    store.clean()
     runner.plan(wanted)
     for name in wanted:
         runner.ensure(name)

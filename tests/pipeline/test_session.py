@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,7 +20,7 @@ from solver.pipeline.session import (
     save_session,
     session_folder,
 )
-from solver.pipeline.settings import from_table, to_table
+from solver.pipeline.settings import from_table, overlay, to_table
 from solver.pipeline.stage import Stage
 
 
@@ -60,6 +60,15 @@ settings = st.builds(
 @given(settings)
 def test_settings_survive_their_table(value: SyncSettings) -> None:
     assert from_table(SyncSettings, to_table(value)) == value
+
+
+@given(settings, settings, st.sets(st.sampled_from(list(SyncSettings.__dataclass_fields__))))
+def test_an_overlay_wins_where_it_says_something(base: SyncSettings, top: SyncSettings, said: set[str]) -> None:
+    table = to_table(top)
+    over = {name: value for name, value in table.items() if name in said}
+    over["unset"] = [name for name in table.get("unset", []) if name in said]
+    merged = from_table(SyncSettings, overlay(to_table(base), over))
+    assert merged == replace(base, **{name: getattr(top, name) for name in said})
 
 
 @pytest.fixture
