@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from solver.video.landmarks import Landmarks
+
 # A slow machine is no failure: no test is timed.
 settings.register_profile("markerscope", deadline=None)
 settings.load_profile("markerscope")
@@ -20,3 +22,11 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"real recordings are not at {folder} (set MARKERSCOPE_DATA)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def squat_landmarks(shared_data: Path) -> Landmarks:
+    """Landmarks of the real squat video, ten a second, tracked once a test run."""
+    from solver.video.blazepose import track_pose
+
+    return track_pose(shared_data / "squat_video" / "video.mp4", rate=10)

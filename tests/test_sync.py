@@ -1,0 +1,191 @@
+"""The offset between a video's clock and the markers', from motion seen by both."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver.errors import InputError
+from solver.markers import Markers
+from solver.sync import find_offset
+from solver.video.landmarks import Landmarks
+
+OFFSET = 1.234  # s
+
+
+def dancer(seed: int, still: float = 1.0):
+    """Paths of 12 joints (callable of time, (T,) -> (T, 12, 3) m): five smooth signals, mixed, never repeating."""
+    rng = np.random.default_rng(seed)
+    frequency = rng.uniform(0.2, 3.0, (5, 8))
+    size, phase = rng.normal(size=(5, 8)) / frequency, rng.uniform(0, 2 * np.pi, (5, 8))
+    mixing = still * 0.04 * rng.normal(size=(5, 12, 3))
+    home = rng.normal(0, 0.4, (12, 3)) + np.array([0, 0, 1])
+
+    def path(time: np.ndarray) -> np.ndarray:
+        signals = (size * np.sin(2 * np.pi * frequency * time[:, None, None] + phase)).sum(axis=2)
+        return home + np.tensordot(signals, mixing, axes=1)
+
+    return path
+
+
+def filmed(path, time: np.ndarray, seed: int, noise: float = 4.0) -> Landmarks:
+    """Landmarks of the joints by a pitched camera 4 m away, with the trembling of a pose network."""
+    rng = np.random.default_rng(seed)
+    yaw, pitch = rng.uniform(0, 6.28), 0.2
+    turn = np.array([[-np.sin(yaw), np.cos(yaw), 0], [0, 0, -1], [np.cos(yaw), np.sin(yaw), 0]])
+    tilt = np.array([[1, 0, 0], [0, np.cos(pitch), -np.sin(pitch)], [0, np.sin(pitch), np.cos(pitch)]])
+    points = (path(time) - [0, 0, 1]) @ (tilt @ turn).T + [0, 0, 4]
+    image = 900 * points[..., :2] / points[..., 2:] + [360, 640]
+    image = image[:, np.arange(33) % 12] + rng.normal(0, noise, (len(time), 33, 2))
+    count = len(time)
+    clock = time - time[0]
+    return Landmarks(
+        image,
+        np.zeros((count, 33, 3)),
+        np.full((count, 33), 0.9),
+        np.ones(count, dtype=bool),
+        clock,
+        np.arange(count),
+        (720, 1280),
+    )
+
+
+def captured(path, time: np.ndarray, seed: int, chosen=range(12), rate: float = 100.0) -> Markers:
+    """Three markers about each chosen joint."""
+    rng = np.random.default_rng(seed)
+    joints = np.repeat(path(time)[:, list(chosen)], 3, axis=1)
+    positions = joints + rng.normal(0, 0.08, joints.shape[1:]) + rng.normal(0, 0.0005, joints.shape)
+    return Markers(positions, rate, tuple(f"M{i}" for i in range(positions.shape[1])))
+
+
+@pytest.mark.parametrize("chosen", [range(12), range(3)], ids=["whole", "limb"])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_offset_comes_back(seed: int, chosen) -> None:
+    path = dancer(seed)
+    video = filmed(path, OFFSET + np.arange(0, 8, 1 / 30), seed)
+    found = find_offset(video, captured(path, np.arange(0, 10, 0.01), seed, chosen))
+    error = abs(found.offset - OFFSET)
+    assert error < 0.01, f"{error:.4f} s off"
+    assert found.confidence > 0.9 and found.rate_ratio == 1.0 and not found.notes
+    np.testing.assert_allclose(found.marker_time(np.array([2.0])), 2.0 + OFFSET, atol=0.01)
+
+
+def test_the_markers_clock_counts_from_its_first_time() -> None:
+    path = dancer(5)
+    markers = replace(captured(path, np.arange(0, 9, 0.01), 5), first_time=100.0)
+    found = find_offset(filmed(path, OFFSET + np.arange(0, 7, 1 / 30), 5), markers)
+    assert abs(found.offset - OFFSET - 100) < 0.01
+
+
+def test_a_video_longer_than_the_markers_and_a_partial_overlap() -> None:
+    path = dancer(6)
+    inside = find_offset(filmed(path, np.arange(0, 20, 1 / 30), 6), captured(path, np.arange(7, 13, 0.01), 6))
+    assert abs(inside.offset + 7) < 0.01 and inside.confidence > 0.9
+    beside = find_offset(filmed(path, np.arange(0, 8, 1 / 30), 6), captured(path, np.arange(1.7, 9.7, 0.01), 6))
+    assert abs(beside.offset + 1.7) < 0.01 and beside.confidence > 0.9
+
+
+def test_gaps_untracked_frames_and_a_variable_rate() -> None:
+    rng = np.random.default_rng(7)
+    path = dancer(7)
+    time = OFFSET + np.cumsum(rng.uniform(0.025, 0.045, 230))
+    video = filmed(path, time, 7)
+    tracked = np.ones(len(time), dtype=bool)
+    tracked[60:90] = False
+    video = replace(video, tracked=tracked, image=np.where(tracked[:, None, None], video.image, np.nan))
+    markers = captured(path, np.arange(0, 10, 0.01), 7)
+    positions = markers.positions.copy()
+    for m in range(positions.shape[1]):
+        for start in rng.integers(0, 1000, 3):
+            positions[start : start + rng.integers(5, 150), m] = np.nan
+    positions[:, 0] = np.nan
+    positions[500, 1] += 3.0  # a wrong sample
+    found = find_offset(video, replace(markers, positions=positions))
+    assert abs(found.offset - time[0]) < 0.015, f"{found.offset - time[0]:+.4f} s off"
+    assert found.confidence > 0.9
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_other_motion_or_none_gives_no_confidence(seed: int) -> None:
+    path = dancer(seed)
+    other = dancer(seed + 50)
+    video = filmed(path, np.arange(0, 8, 1 / 30), seed)
+    mistaken = find_offset(video, captured(other, np.arange(0, 8, 0.01), seed))
+    assert mistaken.confidence < 0.5 and "give the offset" in mistaken.notes[0]
+    still = dancer(seed, still=0.0)
+    motionless = find_offset(filmed(still, np.arange(0, 8, 1 / 30), seed), captured(still, np.arange(0, 8, 0.01), seed))
+    assert motionless.confidence < 0.5
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_purely_periodic_motion_is_ambiguous_by_whole_cycles(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    size, phase = rng.normal(size=(2, 6)), rng.uniform(0, 6.28, (2, 6))
+    mixing, home = 0.05 * rng.normal(size=(2, 12, 3)), rng.normal(0, 0.4, (12, 3)) + np.array([0, 0, 1])
+
+    def path(time: np.ndarray) -> np.ndarray:
+        signals = size * np.sin(2 * np.pi / 0.8 * np.arange(1, 7) * time[:, None, None] + phase)
+        return home + np.tensordot(signals.sum(axis=2), mixing, axes=1)
+
+    video = filmed(path, np.arange(0.5, 8.5, 1 / 30), seed)
+    found = find_offset(video, captured(path, np.arange(0, 10, 0.01), seed))
+    cycles = (found.offset - 0.5) / 0.8
+    assert abs(cycles - round(cycles)) < 0.02, f"{found.offset:.3f} s"
+    assert found.confidence < 0.5, f"{found.confidence:.2f} for one of many equal cycles"
+
+
+@pytest.mark.parametrize("ratio", [30 / 29.97, 29.97 / 30])
+def test_a_clock_at_2997_is_found_in_a_long_recording(ratio: float) -> None:
+    path = dancer(8)
+    time = OFFSET + ratio * np.arange(0, 120, 1 / 30)
+    video = filmed(path, time, 8)
+    video = replace(video, time=np.arange(len(time)) / 30)
+    found = find_offset(video, captured(path, np.arange(0, 122, 0.02), 8, rate=50.0))
+    assert found.rate_ratio == pytest.approx(ratio, abs=1e-9)
+    assert abs(found.offset - OFFSET) < 0.01
+
+
+def test_a_given_range_is_kept_and_one_without_overlap_is_refused() -> None:
+    path = dancer(9)
+    video = filmed(path, OFFSET + np.arange(0, 8, 1 / 30), 9)
+    markers = captured(path, np.arange(0, 10, 0.01), 9)
+    found = find_offset(video, markers, search=(1.0, 1.5))
+    assert abs(found.offset - OFFSET) < 0.01 and found.lags[0] == 1.0 and found.lags[-1] <= 1.5 + 1e-9
+    with pytest.raises(InputError, match="share less than"):
+        find_offset(video, markers, search=(20.0, 22.0))
+
+
+def test_too_little_to_compare_is_refused() -> None:
+    path = dancer(9)
+    video = filmed(path, np.arange(0, 8, 1 / 30), 9)
+    markers = captured(path, np.arange(0, 10, 0.01), 9)
+    nobody = replace(video, tracked=np.zeros(len(video.time), dtype=bool))
+    for bad_video, bad_markers in (
+        (nobody, markers),
+        (video, replace(markers, positions=markers.positions[:1])),
+        (video, replace(markers, positions=np.full_like(markers.positions, np.nan))),
+    ):
+        with pytest.raises(InputError):
+            find_offset(bad_video, bad_markers)
+
+
+@pytest.mark.parametrize(("only", "limit"), [(None, 0.012), ("left_leg", 0.03), ("right_arm", 0.02)])
+def test_the_real_squat(shared_data: Path, squat_landmarks: Landmarks, only: str | None, limit: float) -> None:
+    sys.path.insert(0, str(shared_data.parent / "checks"))
+    try:
+        judge = pytest.importorskip("real_squat")
+    finally:
+        sys.path.pop(0)
+    labels, rate, positions = judge.read_trc(judge.TRIAL / "squats1.trc")
+    segment_of, _ = judge.segments()
+    keep = [i for i, n in enumerate(labels) if n not in judge.COMPUTED]
+    if only:
+        keep = [i for i in keep if segment_of[labels[i]] in judge.PARTS[only]]
+    found = find_offset(squat_landmarks, Markers(positions[:, keep], rate, tuple(str(i) for i in keep)))
+    error = abs(found.offset + 0.010)
+    assert error < limit, f"{error:.4f} s off"
+    assert found.confidence > 0.9
