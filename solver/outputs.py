@@ -13,9 +13,10 @@ import numpy as np
 from solver import __version__
 from solver.body.skeleton import BONES, JOINTS, PARENTS
 from solver.filling import filled_by_body
-from solver.io.atomic import atomic_path, write_text_atomic
+from solver.io.atomic import write_text_atomic
 from solver.io.camera import FILE_NAME as CAMERA
 from solver.io.camera import write_camera
+from solver.io.export_smpl import write_smpl_npz
 from solver.markers import Markers, lab_rotation
 from solver.pipeline.session import Session
 from solver.pipeline.stage import GraphRun
@@ -48,9 +49,9 @@ def _read(path: Path) -> Any:
 
 
 def _write(folder: Path, session: Session, graph: GraphRun) -> None:
-    from solver.angles import write_angles
     from solver.body.bones import with_bone_lengths
     from solver.body.model import Body
+    from solver.io.export_angles import write_angles
     from solver.io.export_bvh import write_bvh
     from solver.io.export_c3d import write_c3d
     from solver.io.export_mot import write_mot
@@ -62,7 +63,7 @@ def _write(folder: Path, session: Session, graph: GraphRun) -> None:
     body = with_bone_lengths(Body.load(body_file.path if body_file else None))
     about = provenance(session, graph)
     write_angles(folder, angles, about)
-    write_mot(folder / "angles.mot", angles.time, angles.names, np.where(angles.singular, np.nan, angles.degrees))
+    write_mot(folder / "angles.mot", angles.time, (angles.names, np.where(angles.singular, np.nan, angles.degrees)))
     write_motion(folder / "motion.npz", markers, motion, body.betas_count)
     write_camera(folder / CAMERA, motion.camera)
     named = labelled(markers, motion)
@@ -86,7 +87,6 @@ def write_motion(path: Path, markers: Markers, motion: FittedMotion, betas_count
         "betas": motion.betas[:betas_count],
         "bone_lengths": motion.betas[betas_count:],
         "gender": np.array("neutral"),
-        "mocap_frame_rate": np.array(float(markers.rate)),
         "joints": motion.joints,
         "joint_names": np.array(JOINTS),
         "R_lab_internal": markers.R_lab_internal,
@@ -95,8 +95,8 @@ def write_motion(path: Path, markers: Markers, motion: FittedMotion, betas_count
         "marker_labels": np.array(markers.labels),
         "time": motion.time,
     }
-    with atomic_path(path) as temporary, open(temporary, "wb") as file:
-        np.savez_compressed(file, **arrays)
+    poses, trans, betas = (arrays.pop(name) for name in ("poses", "trans", "betas"))
+    write_smpl_npz(path, poses, trans, betas, markers.rate, arrays)
 
 
 def labelled(markers: Markers, motion: FittedMotion) -> Markers:

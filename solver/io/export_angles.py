@@ -1,0 +1,63 @@
+"""Joint angles to files: a wide CSV with its sidecar, and a long one for statistics programs."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from solver.angles import JointAngles
+from solver.io.atomic import write_text_atomic
+
+
+def write_angles(folder: str | Path, angles: JointAngles, provenance: Mapping[str, Any]) -> None:
+    """Write ``angles.csv`` (time in s, one column per angle in degrees, empty where singular) and ``angles.json``.
+
+    Parameters
+    ----------
+    provenance : program version, digests of the inputs, settings of every stage
+    """
+    folder = Path(folder)
+    write_text_atomic(folder / "angles.csv", angles_csv(angles))
+    about = {
+        "convention": angles.convention,
+        "title": angles.title,
+        "zero_pose": angles.zero_pose,
+        "units": {"time": "s", "angles": "degrees"},
+        "angles": [
+            {"column": name, "sequence": sequence, "positive": positive, "singular_frames": int(flags.sum())}
+            for name, sequence, positive, flags in zip(
+                angles.names, angles.sequence, angles.positive, angles.singular.T, strict=True
+            )
+        ],
+        **provenance,
+    }
+    write_text_atomic(folder / "angles.json", json.dumps(about, indent=1) + "\n")
+
+
+def angles_csv(angles: JointAngles) -> str:
+    """The wide form: a header line, then a row per frame."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["time", *angles.names])
+    values = np.where(angles.singular, np.nan, angles.degrees)
+    for time, row in zip(angles.time, values, strict=True):
+        writer.writerow([f"{time:.6f}", *("" if np.isnan(v) else f"{v:.4f}" for v in row)])
+    return text.getvalue()
+
+
+def angles_long_csv(angles: JointAngles) -> str:
+    """The long form: a row per frame and angle, with its flag."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["time", "angle", "degrees", "singular"])
+    for i, time in enumerate(angles.time):
+        for k, name in enumerate(angles.names):
+            flag = bool(angles.singular[i, k])
+            writer.writerow([f"{time:.6f}", name, "" if flag else f"{angles.degrees[i, k]:.4f}", int(flag)])
+    return text.getvalue()
