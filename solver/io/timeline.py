@@ -46,7 +46,7 @@ def even_grid(time: np.ndarray | None, frame: np.ndarray | None, declared: float
     declared : Hz
     """
     declared = declared if declared is not None and np.isfinite(declared) and declared > 0 else None
-    if time is not None and len(time) > 1 and np.isfinite(time).all() and np.ptp(time) > 0:
+    if time is not None and len(time) > 1 and np.isfinite(time).all() and 0 < np.ptp(time) < 1e12:
         return _from_time(time, declared)
     first = float(time[0]) if time is not None and len(time) and np.isfinite(time[0]) else None
     rows = len(time) if time is not None else len(frame) if frame is not None else 0
@@ -61,20 +61,22 @@ def even_grid(time: np.ndarray | None, frame: np.ndarray | None, declared: float
 def _from_time(time: np.ndarray, declared: float | None) -> Timeline:
     gaps = np.diff(time)
     usual = float(np.median(gaps))
-    if not usual > 0 or not np.isfinite(1 / usual) or (gaps <= 0).any():
-        note = "The time column does not rise evenly and was ignored."
+    if (gaps < 0).any():
+        note = "The time column runs backwards and was ignored."
         return Timeline(np.arange(len(time)), declared, float(time[0]), (note,))
     notes: tuple[str, ...] = ()
     # A rounded time column (0.01, 0.02, 0.03 at 120 Hz) says the rate badly step by step, but well as a whole.
-    coarse = (len(time) - 1) / (time[-1] - time[0])
-    guess = (
-        declared if declared and (abs(declared * usual - 1) < 0.3 or abs(declared / coarse - 1) < 0.05) else 1 / usual
-    )
+    coarse = float((len(time) - 1) / (time[-1] - time[0]))
+    if (gaps == 0).any():
+        return Timeline(np.arange(len(time)), declared or coarse, float(time[0]))
+    likely = declared is not None and (abs(declared * usual - 1) < 0.3 or abs(declared / coarse - 1) < 0.05)
+    guess = declared if declared is not None and likely else 1 / usual
     steps = np.maximum(np.round(gaps * guess), 1)
     measured = float(steps.sum() / (time[-1] - time[0]))
     tolerance = 5e-4 + 2 * _resolution(time) / (time[-1] - time[0])
     if declared is None:
-        rate = measured if abs(measured / round(measured or 1) - 1) > tolerance else float(round(measured))
+        whole = np.round(measured)
+        rate = measured if abs(measured / np.maximum(whole, 1) - 1) > tolerance else float(whole)
     elif abs(measured / declared - 1) <= tolerance:
         rate = declared
     else:
