@@ -60,7 +60,7 @@ def even_grid(time: np.ndarray | None, frame: np.ndarray | None, declared: float
 
 def _from_time(time: np.ndarray, declared: float | None) -> Timeline:
     gaps = np.diff(time)
-    usual = float(np.median(gaps))
+    usual = float(np.quantile(gaps, 0.25, method="lower"))  # the step from a row to the very next
     if (gaps < 0).any():
         note = "The time column runs backwards and was ignored."
         return Timeline(np.arange(len(time)), declared, float(time[0]), (note,))
@@ -74,14 +74,12 @@ def _from_time(time: np.ndarray, declared: float | None) -> Timeline:
     steps = np.maximum(np.round(gaps * guess), 1)
     measured = float(steps.sum() / (time[-1] - time[0]))
     tolerance = 5e-4 + 2 * _resolution(time) / (time[-1] - time[0])
-    if declared is None:
-        whole = np.round(measured)
-        rate = measured if abs(measured / np.maximum(whole, 1) - 1) > tolerance else float(whole)
-    elif abs(measured / declared - 1) <= tolerance:
+    whole = float(np.round(measured))
+    rate = whole if whole and abs(measured / whole - 1) <= tolerance else measured
+    if declared is not None and abs(measured / declared - 1) <= tolerance:
         rate = declared
-    else:
-        rate = measured
-        notes = (f"The header says {declared:g} Hz but the time column {measured:g} Hz, which was taken.",)
+    elif declared is not None:
+        notes = (f"The header says {declared:g} Hz but the time column {rate:g} Hz, which was taken.",)
     if np.abs(gaps * rate - steps).max() > 0.5:
         notes += ("The time steps are uneven; the frames were taken as evenly spaced.",)
     return _gridded(steps, rate, float(time[0]), notes)
