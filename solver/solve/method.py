@@ -49,15 +49,15 @@ class OrientSettings:
     Attributes
     ----------
     refine : hypotheses refined to the end
-    offset_mm, offset_spread_mm : marker centre above the skin
+    offset_mm, offset_spread_mm : marker centre above the skin; the spread holds what the shapes miss of a real skin, too
     prior_deg : spread of the video's joint rotations
     focal_guess : focal length as a share of the image's longer side, where no camera is given
     """
 
     refine: int = 4
     offset_mm: float = 9.5
-    offset_spread_mm: float = 2.0
-    prior_deg: float = 15.0
+    offset_spread_mm: float = 5.0
+    prior_deg: float = 18.0
     focal_guess: float = 0.85
 
     def weights(self) -> Weights:
@@ -77,11 +77,20 @@ class FitSettings:
     Attributes
     ----------
     candidate : row of the orientation's candidates to use, pinned by hand; None takes the first
-    prior_deg : spread of the video's joint rotations
+    video_share : how much less the video counts than while the markers were being placed: its errors are the same
+        frame after frame, so once the markers have their places it only holds what they do not see
     """
 
     candidate: int | None = None
-    prior_deg: float = 15.0
+    video_share: float = 0.25
+
+    def weights(self) -> Weights:
+        """The same as weights of the fit."""
+        wider = 1 / np.sqrt(max(self.video_share, 1e-6))
+        base = Weights()
+        return replace(
+            base, prior_deg=base.prior_deg * wider, root_deg=base.root_deg * wider, image=base.image * wider
+        )
 
 
 def localize(
@@ -188,7 +197,7 @@ def fit(
     surface = Surface(chosen.surface, chosen.normal)
     frames = found.many if chosen.refined else found.few
     state = State(Pose(chosen.rotations, chosen.trans, chosen.betas), placement, _camera_of(chosen.camera, used.lab_centre))
-    pose = every_frame(body, used, landmarks, frames, state, surface, Weights(prior_deg=settings.prior_deg), progress)
+    pose = every_frame(body, used, landmarks, frames, state, surface, settings.weights(), progress)
     links = forward(body, pose)
     count = seen.markers.shape[1]
     placed = np.full((len(time), count, 3), np.nan)

@@ -99,7 +99,8 @@ class Weights:
     anatomical : share of the anatomical prior
     image : spread of a 2D landmark as a share of the person's height in the image
     shape : strength of the prior on betas and bone lengths, per frame of evidence
-    offset, offset_spread : m, marker centre above the skin (9.5 mm: Ghorbani and Black 2021)
+    offset, offset_spread : m, marker centre above the skin (9.5 mm: Ghorbani and Black 2021); the spread holds the
+        marker's own 2 mm and what the shapes miss of a real skin
     slide : m, how far a marker may slide over the skin in one step
     focal_spread : natural logarithm of the focal length
     free_focal, free_camera : False holds the camera's focal length, or all of it
@@ -107,14 +108,14 @@ class Weights:
 
     marker: float = 0.01
     marker_kernel: float = 0.03
-    prior_deg: float = 15.0
-    root_deg: float = 12.0
+    prior_deg: float = 18.0
+    root_deg: float = 25.0
     anatomical: float = 0.3
     image: float = 0.025
     image_kernel: float = 3.0
-    shape: float = 0.25
+    shape: float = 0.7
     offset: float = 0.0095
-    offset_spread: float = 0.002
+    offset_spread: float = 0.005
     slide: float = 0.02
     focal_guess: float = 0.85
     focal_spread: float = 0.25
