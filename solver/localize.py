@@ -60,7 +60,11 @@ class Search:
 
 
 def hypotheses(
-    markers: np.ndarray, body_points: np.ndarray, vertices: np.ndarray, bone: np.ndarray, search: Search,
+    markers: np.ndarray,
+    body_points: np.ndarray,
+    vertices: np.ndarray,
+    bone: np.ndarray,
+    search: Search,
     R_lab_cam: np.ndarray | None = None,
 ) -> tuple[Hypothesis, ...]:
     """Every distinct way to lay the video's body over the markers, best first.
@@ -158,7 +162,8 @@ def _distinct(found: list[Hypothesis], bone_of: dict[int, int], keep: int) -> tu
     for one in sorted(found, key=lambda h: h.cost):
         bones = np.array([bone_of[int(v)] for v in one.vertex])
         same = any(
-            np.linalg.norm(log_so3(one.R_lab_cam.T @ other.R_lab_cam)) < np.radians(15) and (bones == other_bones).mean() > 0.8
+            np.linalg.norm(log_so3(one.R_lab_cam.T @ other.R_lab_cam)) < np.radians(15)
+            and (bones == other_bones).mean() > 0.8
             for other, other_bones in kept
         )
         if not same:

@@ -25,8 +25,15 @@ from solver.solve.results import FittedMotion
 
 _MADE = "results/outputs.json"
 _FILES = (
-    "angles.csv", "angles.json", "angles.mot", "motion.npz", "motion.bvh", CAMERA,
-    "markers_labelled.c3d", "markers_labelled.trc", "report.html",
+    "angles.csv",
+    "angles.json",
+    "angles.mot",
+    "motion.npz",
+    "motion.bvh",
+    CAMERA,
+    "markers_labelled.c3d",
+    "markers_labelled.trc",
+    "report.html",
 )
 
 
@@ -105,7 +112,9 @@ def labelled(markers: Markers, motion: FittedMotion) -> Markers:
     Along a bone they are numbered from its joint outwards, so that the same layout gets the same names in every trial.
     """
     filled = filled_by_body(markers, motion.placed)
-    middle = np.nanmedian(np.linalg.norm(motion.placed - motion.joints[:, np.clip(motion.marker_joint, 0, None)], axis=2), 0)
+    middle = np.nanmedian(
+        np.linalg.norm(motion.placed - motion.joints[:, np.clip(motion.marker_joint, 0, None)], axis=2), 0
+    )
     names = [f"unassigned_{label}" for label in markers.labels]
     for j, joint in enumerate(JOINTS):
         on_bone = np.flatnonzero(motion.marker_joint == j)
@@ -127,7 +136,11 @@ def provenance(session: Session, graph: GraphRun) -> dict[str, Any]:
         "program": f"markerscope {__version__}",
         "inputs": inputs,
         "stages": {
-            stage.name: {"key": graph.keys[stage.name], "version": stage.version, "settings": canonical(settings[stage.name])}
+            stage.name: {
+                "key": graph.keys[stage.name],
+                "version": stage.version,
+                "settings": canonical(settings[stage.name]),
+            }
             for stage in GRAPH
         },
         "edits": {name: dict(table) for name, table in session.edits.items()},

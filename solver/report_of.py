@@ -67,6 +67,7 @@ def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str,
         for name, row in about["stages"].items()
     )
     marker_file = session.inputs["marker_file"].path
+    filled = np.zeros(markers.present.shape, bool) if named.filled is None else named.filled
     return ReportData(
         title=marker_file.stem,
         subtitle=f"{ranked.candidates[motion.chosen].part}, {len(motion.time)} frames at {markers.rate:g} Hz",
@@ -79,7 +80,7 @@ def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str,
         angles=_curves(graph["angles"]),
         zero_pose=graph["angles"].zero_pose,
         residuals=marker_residuals(named.labels, markers.labels, bones, motion.residual, markers.present, motion.time),
-        gaps=Gaps(named.labels, motion.time, markers.present, named.filled),
+        gaps=Gaps(named.labels, motion.time, markers.present, filled),
         stages=stages,
         versions=_versions(about),
     )
@@ -93,16 +94,27 @@ def _headlines(graph: GraphRun, motion: FittedMotion, ranked: Orientation) -> tu
         Headline("Confidence", f"{100 * motion.confidence:.0f} %", margin),
         Headline("Marker residual", f"{1000 * np.nanmedian(motion.residual):.1f} mm", "median distance from its place"),
         Headline("Marker to skin", f"{1000 * surface.mean:.1f} mm", "mean; a marker's centre stands some 9.5 mm off"),
-        Headline("Sync offset", f"{sync.offset:+.3f} s", f"added to the video's time; confidence {sync.confidence:.2f}"),
+        Headline(
+            "Sync offset", f"{sync.offset:+.3f} s", f"added to the video's time; confidence {sync.confidence:.2f}"
+        ),
     ]
     if np.isfinite(camera.reprojection_px):
-        rows.append(Headline("Reprojection", f"{camera.reprojection_px:.0f} px", "median distance of the video's landmarks"))
+        rows.append(
+            Headline("Reprojection", f"{camera.reprojection_px:.0f} px", "median distance of the video's landmarks")
+        )
     return tuple(rows)
 
 
 def _groups(markers: Markers, found: Segmentation) -> Groups:
     return Groups(
-        markers.labels, found.affinity, found.measured, found.linkage, found.leaves, found.order, found.cut, found.clusters
+        markers.labels,
+        found.affinity,
+        found.measured,
+        found.linkage,
+        found.leaves,
+        found.order,
+        found.cut,
+        found.clusters,
     )
 
 

@@ -41,7 +41,9 @@ def test_pose_jacobian_is_the_finite_difference(body: Body, posed: tuple[Pose, P
             delta = np.zeros(75)
             delta[column] = sign * step
             turned = pose.rotations @ exp_so3(delta[:72].reshape(24, 3))
-            moved.append(place_points(points, forward(body, Pose(turned, pose.trans + delta[72:], pose.betas)), pose.betas))
+            moved.append(
+                place_points(points, forward(body, Pose(turned, pose.trans + delta[72:], pose.betas)), pose.betas)
+            )
         worst = max(worst, np.abs((moved[0] - moved[1]) / (2 * step) - jacobian[..., column]).max())
     assert worst < 1e-7, f"worst column is off by {worst:.2e} m per unit"
 

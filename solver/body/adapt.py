@@ -81,7 +81,9 @@ def _carried(known: Body, joints: np.ndarray) -> np.ndarray:
         p = PARENTS[j]
         length = np.linalg.norm(known.joint_template[j] - known.joint_template[p])
         scale[p] = np.linalg.norm(joints[j] - joints[p]) / max(float(length), 1e-6)
-    scale[[0, 9]] = np.linalg.norm(joints[9] - joints[0]) / np.linalg.norm(known.joint_template[9] - known.joint_template[0])
+    scale[[0, 9]] = np.linalg.norm(joints[9] - joints[0]) / np.linalg.norm(
+        known.joint_template[9] - known.joint_template[0]
+    )
     local = known.template[:, None] - known.joint_template[None]
     moved = joints[None] + local * scale[None, :, None]
     return np.einsum("vj,vjk->vk", known.weights, moved)

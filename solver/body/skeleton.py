@@ -33,7 +33,9 @@ PARTS: dict[str, tuple[str, ...]] = {
 def mirror_index() -> np.ndarray:
     """(24,) the joint on the other side of each joint."""
     swap = {"left": "right", "right": "left"}
-    return np.array([INDEX["_".join([swap.get(name.split("_")[0], name.split("_")[0]), *name.split("_")[1:]])] for name in JOINTS])
+    return np.array(
+        [INDEX["_".join([swap.get(name.split("_")[0], name.split("_")[0]), *name.split("_")[1:]])] for name in JOINTS]
+    )
 
 
 @cache
@@ -49,7 +51,9 @@ def descendants() -> np.ndarray:
 def subtrees(size: int) -> tuple[frozenset[int], ...]:
     """Every connected subtree of ``size`` bones: the candidate "chains" of Milef et al. (2024), section 3.4.2."""
     level: set[frozenset[int]] = {frozenset([j]) for j in range(len(JOINTS))}
-    neighbours = {j: {int(PARENTS[j])} - {-1} | {int(k) for k in np.flatnonzero(PARENTS == j)} for j in range(len(JOINTS))}
+    neighbours = {
+        j: {int(PARENTS[j])} - {-1} | {int(k) for k in np.flatnonzero(j == PARENTS)} for j in range(len(JOINTS))
+    }
     for _ in range(size - 1):
         level = {tree | {n} for tree in level for j in tree for n in neighbours[j] - tree}
     return tuple(sorted(level, key=sorted))

@@ -14,7 +14,7 @@ from solver.markers import Markers
 from solver.pipeline.stage import NoSettings, Stage
 from solver.prior import PosePrior
 from solver.progress import Progress
-from solver.segment import SegmentSettings, Segmentation
+from solver.segment import Segmentation, SegmentSettings
 from solver.solve.method import FitSettings, LocalizeSettings, OrientSettings
 from solver.solve.results import CameraResult, FittedMotion, Localization, Orientation
 from solver.surface import SurfaceDistance

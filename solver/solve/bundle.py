@@ -18,8 +18,8 @@ from solver.parallel import spread
 from solver.progress import Progress, silent
 from solver.solve.kinematics import Points, Pose, blended_turn, forward, place_points
 from solver.solve.placement import Skin
-from solver.solve.refine import carried_over
 from solver.solve.problem import Problem
+from solver.solve.refine import carried_over
 from solver.solve.state import Camera, Energies, Observations, State, Surface, Weights
 
 NOWHERE = Points(np.zeros((0, 3)), np.zeros((0, 3, 0)), np.zeros((0, 24)))
@@ -74,7 +74,9 @@ class Fit:
     trace: tuple[float, ...]
 
 
-def start_state(problem: Problem, guess: Hypothesis, weights: Weights, camera: Camera | None = None) -> tuple[State, Surface]:
+def start_state(
+    problem: Problem, guess: Hypothesis, weights: Weights, camera: Camera | None = None
+) -> tuple[State, Surface]:
     """The video's body laid over the markers as a hypothesis says."""
     betas = np.zeros(problem.body.shape_count)
     skin = Skin(problem.body, betas)
@@ -191,8 +193,17 @@ def reassign(problem: Problem, state: State, weights: Weights) -> tuple[State, S
 
 
 def relax(
-    body: Body, seen: Observations, landmarks: Points, guesses: tuple[Hypothesis, ...], few: np.ndarray, many: np.ndarray,
-    base: Weights, *, keep: int = 4, camera: Camera | None = None, progress: Progress = silent,
+    body: Body,
+    seen: Observations,
+    landmarks: Points,
+    guesses: tuple[Hypothesis, ...],
+    few: np.ndarray,
+    many: np.ndarray,
+    base: Weights,
+    *,
+    keep: int = 4,
+    camera: Camera | None = None,
+    progress: Progress = silent,
 ) -> tuple[Fit, ...]:
     """Every hypothesis relaxed coarsely on few keyframes, the best ``keep`` finely on many.
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from solver.body.skeleton import JOINTS, mirror_index
 from solver.rotations import log_so3
-from solver.solve.state import Observations
 from solver.solve.results import Candidate, Localization, Orientation
+from solver.solve.state import Observations
 
 _SAME_BONES = 0.8
 _SAME_TURN_DEG = 35.0
@@ -61,9 +61,10 @@ def _tie(best: Candidate, rival: Candidate, margin: float) -> str:
     if is_mirror and any(JOINTS[b].startswith(("left", "right")) for b in best.bone):
         return (
             f"Left and right can hardly be told apart: the markers may as well sit on the {rival.part} as on the "
-            f"{best.part} (energy only {excess:.0f} % higher). Give the camera of a full-body trial, or pin the candidate."
+            f"{best.part} (energy only {excess:.0f} % higher). Give the camera of a full-body trial, or pin the "
+            "candidate."
         )
     return (
-        f"A second answer is nearly as good ({rival.part}, camera looking towards {rival.heading_deg:.0f} degrees; energy "
-        f"only {excess:.0f} % higher): compare the candidates and pin the right one."
+        f"A second answer is nearly as good ({rival.part}, camera looking towards {rival.heading_deg:.0f} degrees; "
+        f"energy only {excess:.0f} % higher): compare the candidates and pin the right one."
     )

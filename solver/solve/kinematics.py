@@ -88,7 +88,9 @@ def forward(body: Body, pose: Pose) -> Chain:
 def place_points(points: Points, links: Chain, betas: np.ndarray) -> np.ndarray:
     """(F, P, 3) m, lab frame: where the points are in each pose."""
     frames = len(links.turn)
-    features = points.weights[:, :, None] * np.concatenate([points.shaped(betas), np.ones((len(points.rest), 1))], 1)[:, None]
+    features = (
+        points.weights[:, :, None] * np.concatenate([points.shaped(betas), np.ones((len(points.rest), 1))], 1)[:, None]
+    )
     motion = np.concatenate([links.turn, links.shift[..., None]], axis=-1)  # (F, 24, 3, 4)
     product = features.reshape(len(points.rest), -1) @ motion.transpose(1, 3, 0, 2).reshape(-1, frames * 3)
     return product.reshape(-1, frames, 3).swapaxes(0, 1)

@@ -16,9 +16,9 @@ from solver.solve.bundle import Fit, relax
 from solver.solve.kinematics import Points, Pose, forward, place_points
 from solver.solve.placement import Skin
 from solver.solve.problem import Problem
-from solver.solve.state import Camera, Observations, State, Surface, Weights
 from solver.solve.refine import every_frame
 from solver.solve.results import CameraResult, Candidate, FittedMotion, Localization, Orientation
+from solver.solve.state import Camera, Observations, State, Surface, Weights
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class OrientSettings:
     Attributes
     ----------
     refine : hypotheses refined to the end
-    offset_mm, offset_spread_mm : marker centre above the skin; the spread holds what the shapes miss of a real skin, too
+    offset_mm, offset_spread_mm : marker centre above the skin; the spread holds what the shapes miss of a real skin
     prior_deg : spread of the video's joint rotations
     focal_guess : focal length as a share of the image's longer side, where no camera is given
     """
@@ -88,9 +88,7 @@ class FitSettings:
         """The same as weights of the fit."""
         wider = 1 / np.sqrt(max(self.video_share, 1e-6))
         base = Weights()
-        return replace(
-            base, prior_deg=base.prior_deg * wider, root_deg=base.root_deg * wider, image=base.image * wider
-        )
+        return replace(base, prior_deg=base.prior_deg * wider, root_deg=base.root_deg * wider, image=base.image * wider)
 
 
 def localize(
@@ -154,8 +152,13 @@ def keyframes(seen: Observations, used: np.ndarray, count: int) -> np.ndarray:
 
 
 def orient(
-    body: Body, seen: Observations, landmarks: Points, found: Localization, settings: OrientSettings,
-    camera: CameraResult | None = None, progress: Progress = silent,
+    body: Body,
+    seen: Observations,
+    landmarks: Points,
+    found: Localization,
+    settings: OrientSettings,
+    camera: CameraResult | None = None,
+    progress: Progress = silent,
 ) -> Orientation:
     """Every hypothesis relaxed, the best refined, all ranked."""
     from solver.solve.confidence import judge
@@ -173,7 +176,16 @@ def orient(
         known = _camera_of(camera, used.lab_centre)
         weights = replace(weights, free_camera=False)
     fits = relax(
-        body, used, landmarks, guesses, found.few, found.many, weights, keep=settings.refine, camera=known, progress=progress
+        body,
+        used,
+        landmarks,
+        guesses,
+        found.few,
+        found.many,
+        weights,
+        keep=settings.refine,
+        camera=known,
+        progress=progress,
     )
     index = {id(guess): i for i, guess in enumerate(guesses)}
     whole = Problem(body, used.at(found.many), landmarks)
@@ -182,8 +194,14 @@ def orient(
 
 
 def fit(
-    body: Body, seen: Observations, landmarks: Points, found: Localization, ranked: Orientation, time: np.ndarray,
-    settings: FitSettings, progress: Progress = silent,
+    body: Body,
+    seen: Observations,
+    landmarks: Points,
+    found: Localization,
+    ranked: Orientation,
+    time: np.ndarray,
+    settings: FitSettings,
+    progress: Progress = silent,
 ) -> FittedMotion:
     """The chosen answer carried to every frame."""
     row = 0 if settings.candidate is None else settings.candidate
@@ -196,7 +214,9 @@ def fit(
     placement = Points(chosen.rest, chosen.dirs, chosen.weights)
     surface = Surface(chosen.surface, chosen.normal)
     frames = found.many if chosen.refined else found.few
-    state = State(Pose(chosen.rotations, chosen.trans, chosen.betas), placement, _camera_of(chosen.camera, used.lab_centre))
+    state = State(
+        Pose(chosen.rotations, chosen.trans, chosen.betas), placement, _camera_of(chosen.camera, used.lab_centre)
+    )
     pose = every_frame(body, used, landmarks, frames, state, surface, settings.weights(), progress)
     links = forward(body, pose)
     count = seen.markers.shape[1]
@@ -263,7 +283,7 @@ def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem) -> Cand
 def part_name(bone: np.ndarray) -> str:
     """The part of the body that carries most of the markers, in words."""
     carried = {JOINTS[b] for b in bone}
-    if len(carried) > 8 or {"left", "right"} <= {name.split("_")[0] for name in carried} and len(carried) > 4:
+    if len(carried) > 8 or ({"left", "right"} <= {name.split("_")[0] for name in carried} and len(carried) > 4):
         return "whole body" if len(carried) > 10 else "several parts"
     counts = {part: sum(JOINTS[b] in names for b in bone) for part, names in PARTS.items()}
     best = max(counts, key=lambda part: counts[part])

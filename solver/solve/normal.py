@@ -68,9 +68,14 @@ class NormalEquations:
         self.g_s = np.zeros(shared)
 
     def add_rows(
-        self, columns: np.ndarray, by_pose: np.ndarray, residual: np.ndarray, shared: slice, by_shared: np.ndarray | None
+        self,
+        columns: np.ndarray,
+        by_pose: np.ndarray,
+        residual: np.ndarray,
+        shared: slice,
+        by_shared: np.ndarray | None,
     ) -> None:
-        """Rows (F, R, C) over some columns of each frame, with their residual (F, R) and shared derivatives (F, R, B)."""
+        """Rows (F, R, C) over some columns of each frame, their residual (F, R) and shared derivatives (F, R, B)."""
         transposed = np.swapaxes(by_pose, 1, 2)
         at = np.ix_(np.arange(len(by_pose)), columns, columns)
         self.h_ff[at] += transposed @ by_pose

@@ -58,4 +58,6 @@ def _covered(times: np.ndarray, tracked: np.ndarray, wanted: np.ndarray) -> np.n
 def _at(times: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """Linear interpolation over time of (F, ...) values."""
     flat = values.reshape(len(values), -1)
-    return np.stack([np.interp(wanted, times, column) for column in flat.T], axis=1).reshape(len(wanted), *values.shape[1:])
+    return np.stack([np.interp(wanted, times, column) for column in flat.T], axis=1).reshape(
+        len(wanted), *values.shape[1:]
+    )

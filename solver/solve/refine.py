@@ -19,8 +19,14 @@ _SPREADS = (0.02, 0.01, 0.01, 0.01)
 
 
 def every_frame(
-    body: Body, seen: Observations, landmarks: Points, keyframes: np.ndarray, fitted: State, surface: Surface,
-    base: Weights, progress: Progress = silent,
+    body: Body,
+    seen: Observations,
+    landmarks: Points,
+    keyframes: np.ndarray,
+    fitted: State,
+    surface: Surface,
+    base: Weights,
+    progress: Progress = silent,
 ) -> Pose:
     """Poses of all T frames.
 

@@ -49,8 +49,13 @@ def habit_residual(state: State, weights: Weights) -> tuple[np.ndarray, np.ndarr
 
 
 def image_residual(
-    local: np.ndarray, camera: Camera, pixels: np.ndarray, visible: np.ndarray, person: float,
-    image_size: tuple[int, int], weights: Weights,
+    local: np.ndarray,
+    camera: Camera,
+    pixels: np.ndarray,
+    visible: np.ndarray,
+    person: float,
+    image_size: tuple[int, int],
+    weights: Weights,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(N, L, 2) px between landmarks and the body's points in camera coordinates (N, L, 3); weight and cost (N, L).
 

@@ -26,6 +26,4 @@ def landmarks_of_prior(prior: PosePrior, body: Body) -> Landmarks:
     visibility = np.isfinite(world[..., 0]) * prior.tracked[:, None].astype(float)
     image = world[..., :2] * _PX_PER_M
     image[~prior.tracked] = world[~prior.tracked] = np.nan
-    return Landmarks(
-        image, world, visibility, prior.tracked, prior.time, np.arange(count), (1000, 1000), prior.source
-    )
+    return Landmarks(image, world, visibility, prior.tracked, prior.time, np.arange(count), (1000, 1000), prior.source)

@@ -38,8 +38,8 @@ def simulate(body: Body, seed: int, frames: int = 60, markers: int = 36, only: s
     swing = np.zeros((frames, 24, 3))
     for joint, axis, reach in (
         ("left_hip", 0, 40), ("right_hip", 0, 40), ("left_knee", 0, 50), ("right_knee", 0, 50), ("left_ankle", 0, 20),
-        ("right_ankle", 0, 20), ("spine1", 0, 12), ("spine3", 1, 15), ("left_shoulder", 2, 30), ("right_shoulder", 2, 30),
-        ("left_elbow", 1, 35), ("right_elbow", 1, 35),
+        ("right_ankle", 0, 20), ("spine1", 0, 12), ("spine3", 1, 15), ("left_shoulder", 2, 30),
+        ("right_shoulder", 2, 30), ("left_elbow", 1, 35), ("right_elbow", 1, 35),
     ):  # fmt: skip
         phase, speed = rng.uniform(0, 2 * np.pi), rng.uniform(1.5, 4)
         swing[:, INDEX[joint], axis] = np.radians(reach) * np.sin(speed * time + phase)
@@ -61,7 +61,9 @@ def simulate(body: Body, seed: int, frames: int = 60, markers: int = 36, only: s
     view = view @ exp_so3(np.array([0.1, 0.0, 0.03]))
     camera = Camera(view, np.array([0.1, 0.1, 4.0]), np.array([0.0, 0.4, 0.9]), 900.0)
     points, _ = landmark_points(body)
-    image = camera.project(place_points(points, links, betas), (720, 960)) + rng.normal(0, 4, (frames, len(points.rest), 2))
+    image = camera.project(place_points(points, links, betas), (720, 960)) + rng.normal(
+        0, 4, (frames, len(points.rest), 2)
+    )
     prior = rotations @ exp_so3(np.radians(6) * rng.normal(0, 1, (24, 3)) / np.sqrt(3) * np.ones((frames, 1, 1)))
     prior = prior @ exp_so3(np.radians(5) * rng.normal(0, 1, (frames, 24, 3)) / np.sqrt(3))
     prior[:, 0] = view.T @ prior[:, 0]
