@@ -13,6 +13,7 @@ from solver.io.text import decode, read_bytes, split_lines
 from solver.markers import UpAxis, lab_rotation
 
 _INCH = 0.0254
+_DOF = {"tx", "ty", "tz", "rx", "ry", "rz", "l"}
 
 
 @dataclass
@@ -54,7 +55,7 @@ def read_asf_amc(asf: str | Path, amc: str | Path, *, rate: float = 120.0, up: U
     """
     try:
         skeleton = _skeleton(_lines(asf))
-    except (ValueError, IndexError, KeyError, StopIteration) as error:
+    except (ValueError, IndexError, KeyError, ArithmeticError) as error:
         raise InputError("is not an ASF skeleton, or is damaged or cut off", asf, "copy it again") from error
     try:
         frames = _frames(_lines(amc), skeleton)
@@ -100,6 +101,7 @@ def _lines(path: str | Path) -> list[list[str]]:
 def _skeleton(lines: list[list[str]]) -> _Skeleton:
     """Parse an ASF. Raises ValueError, IndexError or KeyError where it is not one."""
     sections: dict[str, list[list[str]]] = {}
+    section: list[list[str]] = []
     for words in lines:
         if words[0].startswith(":"):
             section = sections.setdefault(words[0].lower(), [])
@@ -112,6 +114,7 @@ def _skeleton(lines: list[list[str]]) -> _Skeleton:
     root.axis_order = header["axis"][0].lower()
     root.dof = [word.lower() for word in header["order"]]
     bones: dict[str, _Bone] = {"root": root}
+    bone = _Bone()
     for words in sections[":bonedata"]:
         key = words[0].lower()
         if key == "begin":
@@ -131,9 +134,16 @@ def _skeleton(lines: list[list[str]]) -> _Skeleton:
             bones[bone.name] = bone
     if any(sorted(bone.axis_order) != ["x", "y", "z"] for bone in bones.values()):
         raise ValueError("axis order")
+    if any(not _DOF.issuperset(bone.dof) for bone in bones.values()):
+        raise ValueError("degrees of freedom")
     names, parents = _tree(sections[":hierarchy"])
     scale = _INCH / float(units.get("length", 1))
     position = np.array(header["position"][:3], dtype=float)
+    vectors = [position, *(v for bone in bones.values() for v in (bone.direction, bone.axis))]
+    if any(v.shape != (3,) for v in vectors):
+        raise ValueError("not three numbers")
+    if not np.isfinite([scale, *np.concatenate(vectors), *(bone.length for bone in bones.values())]).all():
+        raise ValueError("not a number")
     return _Skeleton([bones[name] for name in names], parents, position, scale)
 
 

@@ -59,8 +59,8 @@ def read_table(path: str | Path, text: str | None = None) -> RawMarkers:
 
 def _read(sheet: _Sheet, columns: Columns, path: str | Path) -> RawMarkers:
     table = number_table(sheet.rows, sheet.numbers, path)
-    need = max(max(cells) for cells in columns.xyz) + 1
-    wide = np.full((len(table), max(need, table.shape[1])), np.nan)
+    used = [columns.time or 0, columns.frame or 0, *columns.filled.values(), *(k for xyz in columns.xyz for k in xyz)]
+    wide = np.full((len(table), max(max(used) + 1, table.shape[1])), np.nan)
     wide[:, : table.shape[1]] = table
     positions = wide[:, np.array(columns.xyz)]
     filled = np.zeros(positions.shape[:2], dtype=bool)

@@ -30,8 +30,8 @@ class Timeline:
         """Rows (rows, ...) laid out on the grid (T, ...); frames without a row are NaN (False for flags)."""
         if len(self.index) == 0 or self.index[-1] == len(values) - 1:
             return values
-        blank = np.zeros if values.dtype == bool else lambda shape: np.full(shape, np.nan)
-        grid = blank((int(self.index[-1]) + 1, *values.shape[1:]))
+        shape = (int(self.index[-1]) + 1, *values.shape[1:])
+        grid = np.zeros(shape, dtype=bool) if values.dtype == bool else np.full(shape, np.nan)
         grid[self.index] = values
         return grid
 
