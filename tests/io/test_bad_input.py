@@ -198,18 +198,27 @@ def test_a_disk_that_is_full(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@relaxed
-@given(data=st.data())
-def test_damaged_motion_files(tmp_path: Path, recording: Callable[..., Markers], data: st.DataObject) -> None:
-    write_everything(tmp_path, recording(1))
-    (tmp_path / "a.asf").write_text(
+@pytest.fixture(scope="module")
+def whole_motion(recording: Callable[..., Markers], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a small valid file of every format of motion."""
+    folder = tmp_path_factory.mktemp("motion")
+    write_everything(folder, recording(1))
+    (folder / "a.asf").write_text(
         ":units\n length 0.45\n angle deg\n:root\n order TX TY TZ RX RY RZ\n axis XYZ\n position 0 0 0\n"
         " orientation 0 0 0\n:bonedata\n begin\n id 1\n name leg\n direction 0 -1 0\n length 5\n axis 0 0 20 XYZ\n"
         " dof rx ry rz\n end\n:hierarchy\n begin\n root leg\n end\n"
     )
-    (tmp_path / "a.amc").write_text(":FULLY-SPECIFIED\n:DEGREES\n1\nroot 1 2 3 4 5 6\nleg 7 8 9\n")
+    (folder / "a.amc").write_text(":FULLY-SPECIFIED\n:DEGREES\n1\nroot 1 2 3 4 5 6\nleg 7 8 9\n")
+    return folder
+
+
+@relaxed
+@given(data=st.data())
+def test_damaged_motion_files(tmp_path: Path, whole_motion: Path, data: st.DataObject) -> None:
+    for good in ("a.asf", "a.amc"):
+        (tmp_path / good).write_bytes((whole_motion / good).read_bytes())
     name = data.draw(st.sampled_from(["a.mot", "a.bvh", "a.asf", "a.amc"]))
-    content = bytearray((tmp_path / name).read_bytes())
+    content = bytearray((whole_motion / name).read_bytes())
     if data.draw(st.booleans()):
         del content[data.draw(st.integers(0, len(content) - 1)) :]
     else:
