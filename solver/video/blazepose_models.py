@@ -6,6 +6,9 @@ Shapes, thresholds and decoding follow MediaPipe's published graphs ``pose_detec
 from __future__ import annotations
 
 import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -104,8 +107,9 @@ class _Model:
     def __init__(self, name: str, threads: int) -> None:
         from ai_edge_litert.interpreter import Interpreter
 
-        self._interpreter: Any = Interpreter(model_content=_verified(name), num_threads=threads)
-        self._interpreter.allocate_tensors()
+        with _without_native_stderr():
+            self._interpreter: Any = Interpreter(model_content=_verified(name), num_threads=threads)
+            self._interpreter.allocate_tensors()
         self._input = self._interpreter.get_input_details()[0]["index"]
         self._outputs = [detail["index"] for detail in self._interpreter.get_output_details()]
 
@@ -113,6 +117,24 @@ class _Model:
         self._interpreter.set_tensor(self._input, picture[None])
         self._interpreter.invoke()
         return [self._interpreter.get_tensor(self._outputs[i]) for i in outputs]
+
+
+@contextmanager
+def _without_native_stderr() -> Iterator[None]:
+    """Silence the runtime's greeting, which it writes past Python and cannot be told to leave out."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # a windowed program may have no standard error at all
+        yield
+        return
+    sink = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(sink, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(sink)
+        os.close(kept)
 
 
 def _verified(name: str) -> bytes:

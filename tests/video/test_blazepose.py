@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -81,6 +82,12 @@ def test_a_changed_network_is_refused(tmp_path: Path, monkeypatch: pytest.Monkey
     (tmp_path / "pose_detection.tflite").unlink()
     with pytest.raises(InputError, match="missing"):
         blazepose_models.Detector()
+
+
+def test_loading_a_network_writes_nothing_and_keeps_standard_error(capfd: pytest.CaptureFixture[str]) -> None:
+    blazepose_models.Detector()
+    os.write(2, b"still here")
+    assert capfd.readouterr() == ("", "still here")
 
 
 def test_landmarks_lie_on_the_reprojected_joints(shared_data: Path, squat_landmarks: Landmarks) -> None:
