@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+_NEARLY_HALF_A_TURN = 3.1
+
 
 def exp_so3(vector: np.ndarray) -> np.ndarray:
     """(..., 3) rotation vectors in rad to (..., 3, 3) matrices (Rodrigues)."""
@@ -19,9 +21,26 @@ def exp_so3(vector: np.ndarray) -> np.ndarray:
 
 def log_so3(matrix: np.ndarray) -> np.ndarray:
     """(..., 3, 3) matrices to (..., 3) rotation vectors in rad, angle within [0, pi]."""
-    from scipy.spatial.transform import Rotation
+    twice_sine = np.stack(
+        [
+            matrix[..., 2, 1] - matrix[..., 1, 2],
+            matrix[..., 0, 2] - matrix[..., 2, 0],
+            matrix[..., 1, 0] - matrix[..., 0, 1],
+        ],
+        axis=-1,
+    )
+    cosine = (matrix[..., 0, 0] + matrix[..., 1, 1] + matrix[..., 2, 2] - 1) / 2
+    sine = np.sqrt(np.einsum("...i,...i->...", twice_sine, twice_sine)) / 2
+    angle = np.arctan2(sine, cosine)
+    scale = np.where(sine > 1e-8, angle / np.maximum(2 * sine, 1e-16), 0.5)
+    vector = twice_sine * scale[..., None]
+    # Near half a turn the sine vanishes and the axis has to be read off the symmetric part.
+    turned = angle > _NEARLY_HALF_A_TURN
+    if np.any(turned):
+        from scipy.spatial.transform import Rotation
 
-    return Rotation.from_matrix(matrix.reshape(-1, 3, 3)).as_rotvec().reshape(*matrix.shape[:-2], 3)
+        vector[turned] = Rotation.from_matrix(matrix[turned]).as_rotvec()
+    return vector
 
 
 def skew(v: np.ndarray) -> np.ndarray:

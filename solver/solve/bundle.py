@@ -16,6 +16,7 @@ from solver.body.model import Body
 from solver.localize import Hypothesis
 from solver.parallel import spread
 from solver.progress import Progress, silent
+from solver.rotations import log_so3
 from solver.solve.kinematics import Points, Pose, blended_turn, forward, place_points
 from solver.solve.placement import Skin
 from solver.solve.problem import Problem
@@ -23,6 +24,12 @@ from solver.solve.refine import carried_over
 from solver.solve.state import Camera, Energies, Observations, State, Surface, Weights
 
 NOWHERE = Points(np.zeros((0, 3)), np.zeros((0, 3, 0)), np.zeros((0, 24)))
+
+
+_SAME_ENERGY = 1.03
+_SAME_TURN = np.radians(3.0)
+_ENOUGH = 3e-4
+"""A phase ends when a step gains less than this share of the energy."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +140,7 @@ def descend(
                 state, surface = reattach(problem.body, state)
                 cost = problem.energies(state, weights, surface).total
             trace.append(cost)
-            if gain < 1e-4:
+            if gain < _ENOUGH:
                 break
     return state, surface, tuple(trace)
 
@@ -239,11 +246,14 @@ def relax(
     whole = Problem(body, seen.at(many), landmarks)
     progress(0.6, f"refining {len(chosen)} hypotheses")
 
-    def last_look(fit: Fit) -> Fit:
+    def closer_look(fit: Fit) -> Fit:
         pose = carried_over(body, seen, few, fit.state).at(many)
-        return _advance(whole, replace(fit, state=replace(fit.state, pose=pose)), phases=FINE, base=base, judge=judge)
+        return _advance(
+            whole, replace(fit, state=replace(fit.state, pose=pose)), phases=FINE[:1], base=base, judge=judge
+        )
 
-    fine = spread(last_look, chosen)
+    fine = _basins(spread(closer_look, chosen))
+    fine = spread(partial(_advance, whole, phases=FINE[1:], base=base, judge=judge), fine)
     fine.sort(key=lambda fit: fit.energies.total)
     return tuple(fine) + tuple(fit for fit in pool if not any(fit is one for one in chosen))
 
@@ -252,6 +262,21 @@ def _advance(problem: Problem, fit: Fit, *, phases: tuple[Phase, ...], base: Wei
     """The same fit after some more phases of descent."""
     state, surface, trace = descend(problem, fit.state, fit.surface, phases, base)
     return Fit(fit.start, state, surface, problem.energies(state, judge, surface), fit.trace + trace)
+
+
+def _basins(fits: list[Fit]) -> list[Fit]:
+    """The fits less those that have run into a better one: same bones, same camera, nearly the same energy."""
+    kept: list[Fit] = []
+    for fit in sorted(fits, key=lambda fit: fit.energies.total):
+        bones = fit.state.placement.weights.argmax(1)
+        for one in kept:
+            turn = np.linalg.norm(log_so3(one.state.camera.R_lab_cam.T @ fit.state.camera.R_lab_cam))
+            near = fit.energies.total < _SAME_ENERGY * one.energies.total
+            if near and turn < _SAME_TURN and (bones == one.state.placement.weights.argmax(1)).mean() > 0.95:
+                break
+        else:
+            kept.append(fit)
+    return kept
 
 
 def _varied(pool: list[Fit], keep: int) -> list[Fit]:

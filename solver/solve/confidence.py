@@ -24,8 +24,8 @@ def judge(candidates: tuple[Candidate, ...], seen: Observations, found: Localiza
     moved = movement_deg(seen.prior)
     if moved < _STILL_DEG:
         warnings.append(
-            f"The person hardly moves (joints turn by {moved:.0f} degrees in the video), so markers cannot be told apart "
-            "by their motion: check which bones they were given to."
+            f"The person hardly moves (joints turn by {moved:.0f} degrees in the video), so markers cannot be told "
+            "apart by their motion: check which bones they were given to."
         )
     if rivals and margin < 1.15:
         warnings.append(_tie(best, candidates[runner_up], margin))

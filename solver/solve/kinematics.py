@@ -104,10 +104,12 @@ def blended_turn(points: Points, links: Chain) -> np.ndarray:
 
 def pose_jacobian(points: Points, links: Chain, betas: np.ndarray, joints: np.ndarray) -> np.ndarray:
     """(F, P, 3, 3 K + 3): derivative by a right-hand turn of each of the K ``joints`` (rad) and by translation (m)."""
-    below = descendants()[joints].astype(float)  # (K, 24)
-    posed = (links.turn @ points.shaped(betas).T).transpose(0, 3, 1, 2) + links.shift[:, None]  # (F, P, 24, 3)
-    lever = below @ (points.weights[None, :, :, None] * posed)
-    lever -= (points.weights @ below.T)[None, :, :, None] * links.place[:, None, joints]
+    bones = np.flatnonzero(points.weights.any(axis=0))
+    weights = points.weights[:, bones]
+    below = descendants()[np.ix_(joints, bones)].astype(float)  # (K, B)
+    posed = (links.turn[:, bones] @ points.shaped(betas).T).transpose(0, 3, 1, 2) + links.shift[:, None, bones]
+    lever = below @ (weights[None, :, :, None] * posed)
+    lever -= (weights @ below.T)[None, :, :, None] * links.place[:, None, joints]
     frames, count = lever.shape[:2]
     out = np.empty((frames, count, 3, len(joints) * 3 + 3))
     turns = out[..., :-3].reshape(frames, count, 3, len(joints), 3)

@@ -27,11 +27,15 @@ _LIMBS = (
 
 @dataclass(frozen=True)
 class Group:
-    """Points that move with the same joints: their indices, the joints, and the columns those have per frame."""
+    """Points that move with the same joints: their indices, the joints, and the columns those have per frame.
+
+    ``runs`` are the same columns as stretches: (where in the frame's unknowns, where in the group's).
+    """
 
     points: np.ndarray
     joints: np.ndarray
     columns: np.ndarray
+    runs: tuple[tuple[slice, slice], ...]
 
 
 @cache
@@ -51,9 +55,12 @@ def groups(weights: np.ndarray) -> list[Group]:
     limb = covered.argmax(axis=1)
     found = []
     for i in np.unique(limb):
-        joints = np.flatnonzero(_limb_masks()[i])
-        columns = np.concatenate([(3 * joints[:, None] + np.arange(3)).ravel(), np.arange(POSE_SIZE - 3, POSE_SIZE)])
-        found.append(Group(np.flatnonzero(limb == i), joints, columns))
+        place = np.flatnonzero(_limb_masks()[i][FREE])
+        columns = np.concatenate([(3 * place[:, None] + np.arange(3)).ravel(), np.arange(POSE_SIZE - 3, POSE_SIZE)])
+        breaks = np.flatnonzero(np.diff(columns) != 1) + 1
+        ends = zip([0, *breaks.tolist()], [*breaks.tolist(), len(columns)], strict=True)
+        runs = tuple((slice(columns[a], columns[b - 1] + 1), slice(a, b)) for a, b in ends)
+        found.append(Group(np.flatnonzero(limb == i), FREE[place], columns, runs))
     return found
 
 
@@ -69,7 +76,7 @@ class NormalEquations:
 
     def add_rows(
         self,
-        columns: np.ndarray,
+        group: Group,
         by_pose: np.ndarray,
         residual: np.ndarray,
         shared: slice,
@@ -77,11 +84,17 @@ class NormalEquations:
     ) -> None:
         """Rows (F, R, C) over some columns of each frame, their residual (F, R) and shared derivatives (F, R, B)."""
         transposed = np.swapaxes(by_pose, 1, 2)
-        at = np.ix_(np.arange(len(by_pose)), columns, columns)
-        self.h_ff[at] += transposed @ by_pose
-        self.g_f[:, columns] += (transposed @ residual[..., None])[..., 0]
+        square = transposed @ by_pose
+        slope = (transposed @ residual[..., None])[..., 0]
+        cross = None if by_shared is None else transposed @ by_shared
+        # Adding stretch by stretch is several times faster than through an index of all columns.
+        for at, of in group.runs:
+            self.g_f[:, at] += slope[:, of]
+            for also_at, also_of in group.runs:
+                self.h_ff[:, at, also_at] += square[:, of, also_of]
+            if cross is not None:
+                self.h_fs[:, at, shared] += cross[:, of]
         if by_shared is not None:
-            self.h_fs[:, columns, shared] += transposed @ by_shared
             flat = by_shared.reshape(-1, by_shared.shape[2])
             self.h_ss[shared, shared] += flat.T @ flat
             self.g_s[shared] += flat.T @ residual.ravel()

@@ -115,12 +115,13 @@ class Problem:
             rows = root[:, p, :, None] * group_jacobian(points, group, links, betas)
             flat = rows.reshape(frames, -1, rows.shape[3])
             shape_rows = None if by_shape is None else by_shape[:, p].reshape(frames, flat.shape[1], -1)
-            sums.add_rows(group.columns, flat, scaled[:, p].reshape(frames, -1), self.shape_at, shape_rows)
+            sums.add_rows(group, flat, scaled[:, p].reshape(frames, -1), self.shape_at, shape_rows)
             if by_place is not None:
                 cross = np.swapaxes(rows, 2, 3) @ by_place[:, p]  # (F, p, C, 3)
                 columns = (self.placement_at.start + 3 * p[:, None] + np.arange(3)).ravel()
                 block = cross.transpose(0, 2, 1, 3).reshape(frames, len(group.columns), -1)
-                sums.h_fs[:, group.columns[:, None], columns] += block
+                for at, of in group.runs:
+                    sums.h_fs[:, at, columns] += block[:, of]
         if by_place is not None:
             self._add_placement(sums, by_place, by_shape, scaled)
 
@@ -164,7 +165,7 @@ class Problem:
             p = group.points
             rows = (by_lab[:, p] @ group_jacobian(points, group, links, betas)).reshape(frames, 2 * len(p), -1)
             mine = None if shared_rows is None else shared_rows[:, p].reshape(frames, 2 * len(p), -1)
-            sums.add_rows(group.columns, rows, scaled[:, p].reshape(frames, -1), shared, mine)
+            sums.add_rows(group, rows, scaled[:, p].reshape(frames, -1), shared, mine)
         focal_at = self.camera_at.stop - 1
         sums.h_ss[focal_at, focal_at] += 1 / weights.focal_spread**2
         focal = focal_residual(camera, self.seen.image_size, weights)

@@ -8,8 +8,9 @@ import numpy as np
 
 from solver.solve.kinematics import Points, Pose
 
-FREE = np.arange(22)
-"""Joints that a fit turns: all but the hands, which neither markers nor landmarks show."""
+FREE = np.array([0, 1, 4, 7, 10, 2, 5, 8, 11, 3, 6, 9, 12, 15, 13, 16, 18, 20, 14, 17, 19, 21])
+"""Joints that a fit turns: all but the hands, which neither markers nor landmarks show. In the order of their unknowns:
+limb by limb, so that what moves a point lies together."""
 POSE_SIZE = 3 * len(FREE) + 3
 CAMERA_SIZE = 7
 
