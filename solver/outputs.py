@@ -17,7 +17,7 @@ from solver.io.atomic import write_text_atomic
 from solver.io.camera import FILE_NAME as CAMERA
 from solver.io.camera import write_camera
 from solver.io.export_smpl import write_smpl_npz
-from solver.markers import Markers, lab_rotation
+from solver.markers import Markers
 from solver.pipeline.session import Session
 from solver.pipeline.stage import GraphRun
 from solver.rotations import log_so3
@@ -78,11 +78,9 @@ def _write(folder: Path, session: Session, graph: GraphRun) -> None:
     write_trc(folder / "markers_labelled.trc", named)
     rest = body.joints(motion.betas)
     offsets = np.concatenate([np.zeros((1, 3)), rest[1:] - rest[PARENTS[1:]]])
-    # BVH is y up: the root is turned from the z-up lab, the joints' own axes are y up already.
-    up = lab_rotation("y")
-    turned = motion.rotations.copy()
-    turned[:, 0] = up @ turned[:, 0]
-    write_bvh(folder / "motion.bvh", JOINTS, PARENTS, offsets, turned, motion.joints[:, 0] @ up.T, markers.rate)
+    write_bvh(
+        folder / "motion.bvh", JOINTS, PARENTS, offsets, motion.rotations, motion.joints[:, 0], markers.rate
+    )
     report_of(folder / "report.html", session, graph, named, about)
 
 
