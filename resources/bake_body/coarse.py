@@ -11,6 +11,8 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import dijkstra
 
 RELAXATIONS = 12
+REPAIRS = 50
+"""Seeds that may be added where regions meet twice, as around a finger."""
 
 
 def coarse_mesh(
@@ -26,7 +28,13 @@ def coarse_mesh(
     seeds = _spread(graph, allowed, count)
     for _ in range(RELAXATIONS):
         seeds = _relax(graph, vertices, mass, allowed, seeds)
-    dual = _dual(graph, faces, seeds)
+    dual = _dual(faces, _regions(graph, seeds))
+    for _ in range(REPAIRS):
+        bad = bad_edges(dual)
+        if not len(bad):
+            break
+        seeds = np.append(seeds, _farthest(graph, allowed, seeds, bad[0]))
+        dual = _dual(faces, _regions(graph, seeds))
     used = np.unique(dual)
     place = np.full(len(seeds), -1)
     place[used] = np.arange(len(used))
@@ -74,18 +82,24 @@ def _relax(
     return np.where(np.isfinite(distance[first]), first, seeds)
 
 
-def _dual(graph: sp.csr_matrix, faces: np.ndarray, seeds: np.ndarray) -> np.ndarray:
-    """(F', 3) triangles between the seeds of regions that meet at a face, each once, with the face's orientation."""
-    corner = _regions(graph, seeds)[faces]
+def _farthest(graph: sp.csr_matrix, allowed: np.ndarray, seeds: np.ndarray, regions: np.ndarray) -> int:
+    """The allowed vertex farthest from its seed in the given regions."""
+    distance = dijkstra(graph, indices=seeds, min_only=True)
+    return int(np.argmax(np.where(allowed & np.isin(_regions(graph, seeds), regions), distance, -1)))
+
+
+def _dual(faces: np.ndarray, region: np.ndarray) -> np.ndarray:
+    """(F', 3) triangles between regions (V,) that meet at a face, each once, with the face's orientation."""
+    corner = region[faces]
     distinct = (corner[:, 0] != corner[:, 1]) & (corner[:, 1] != corner[:, 2]) & (corner[:, 2] != corner[:, 0])
     triangles = corner[distinct]
-    first = np.argmin(triangles, axis=1)
-    return np.unique(np.stack([np.take_along_axis(triangles, ((first + i) % 3)[:, None], 1)[:, 0] for i in range(3)], 1), axis=0)
+    first = np.argmin(triangles, axis=1)[:, None]
+    return np.unique(np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1), axis=0)
 
 
-def open_edges(faces: np.ndarray) -> int:
-    """How many directed edges lack their opposite or are met twice: 0 for a closed, oriented manifold."""
-    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    forward, counts = np.unique(edges, axis=0, return_counts=True)
-    backward = {(int(b), int(a)) for a, b in forward}
-    return int((counts > 1).sum()) + sum((int(a), int(b)) not in backward for a, b in forward)
+def bad_edges(faces: np.ndarray) -> np.ndarray:
+    """(E, 2) directed edges without an opposite, or met twice: none in a closed, oriented manifold."""
+    edges, counts = np.unique(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=0, return_counts=True)
+    present = {(int(a), int(b)) for a, b in edges}
+    lonely = np.array([(int(b), int(a)) not in present for a, b in edges], dtype=bool)
+    return edges[lonely | (counts > 1)]

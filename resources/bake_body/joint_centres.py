@@ -1,12 +1,13 @@
 """Anatomical joint centres in place of the rig's, from landmarks and published regressions, body by body.
 
 ======== =====================================================================================================
-hip      Harrington et al. 2007 (J Biomech 40:595), from the pelvis' width and depth between bony iliac spines
+hip      Harrington et al. 2007 (J Biomech 40:595), from the pelvis' place and tilt on the mesh and its average size
 knee     midway between the femoral epicondyles (ISB, Wu et al. 2002)
 ankle    midway between the malleoli (ISB, Wu et al. 2002)
-shoulder centre of the humeral head under the acromion: 13 % of the biacromial width down, 3 % inward, 2 % forward.
-         The acromion's thickness (9 mm), the subacromial space (10), the head's radius (24) and skin (6) make 49 mm,
-         13 % of an average 380 mm; Rab et al. 2002 (Gait Posture 15:182) say 17 % from a marker's centre
+shoulder centre of the humeral head under the acromion: 12 % of the biacromial width down, 3 % inward, 2 % forward.
+         Acromion (8 mm), subacromial space (10), the head's radius (24) and skin (4) make 46 mm, 12 % of an average
+         380 mm; de Leva 1996 (J Biomech 29:1223) has 35 mm, Rab et al. 2002 (Gait Posture 15:182) 17 % from a
+         marker's centre, some 55 mm from the skin
 elbow    midway between the humeral epicondyles (ISB, Wu et al. 2005)
 wrist    midway between the radial and ulnar styloids (ISB, Wu et al. 2005)
 ======== =====================================================================================================
@@ -19,9 +20,9 @@ import numpy as np
 from resources.bake_body.picker import Landmark
 from solver.body.skeleton import INDEX
 
-SKIN_OVER_ILIAC_SPINES = 0.010
-"""m of soft tissue between skin and iliac spine, lean to average adults."""
-SHOULDER = {"inward": 0.03, "down": 0.13, "forward": 0.02}
+PELVIS_WIDTH, PELVIS_DEPTH = 0.140, 0.092
+"""Over stature: between the two front iliac spines (237 mm at 1.69 m), and from their middle to that of the rear ones."""
+SHOULDER = {"inward": 0.03, "down": 0.12, "forward": 0.02}
 """Humeral head from the acromion, over the biacromial width."""
 
 
@@ -29,7 +30,9 @@ def correct(joints: np.ndarray, vertices: np.ndarray, landmarks: dict[str, Landm
     """(N, 24, 3) anatomical joint centres of bodies (N, V, 3) in the A-pose, y up, facing +z."""
     moved = joints.copy()
     at = {name: landmark.of(vertices) for name, landmark in landmarks.items()}
-    hips = hip_centres(at["left_asis"], at["right_asis"], at["left_psis"], at["right_psis"])
+    hips = hip_centres(
+        at["left_asis"], at["right_asis"], at["left_psis"], at["right_psis"], np.ptp(vertices[..., 1], axis=1)
+    )
     width = np.linalg.norm(at["left_acromion"] - at["right_acromion"], axis=-1)
     for i, (side, sign) in enumerate((("left", 1.0), ("right", -1.0))):
         moved[:, INDEX[f"{side}_hip"]] = hips[i]
@@ -47,23 +50,25 @@ def correct(joints: np.ndarray, vertices: np.ndarray, landmarks: dict[str, Landm
 
 
 def hip_centres(
-    left_asis: np.ndarray, right_asis: np.ndarray, left_psis: np.ndarray, right_psis: np.ndarray
+    left_asis: np.ndarray, right_asis: np.ndarray, left_psis: np.ndarray, right_psis: np.ndarray, stature: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Left and right hip joint centres (N, 3) m by Harrington et al. (2007), from iliac spines (N, 3) m on the skin."""
-    origin, sacrum = (left_asis + right_asis) / 2, (left_psis + right_psis) / 2
-    across = right_asis - left_asis
-    width = np.linalg.norm(across, axis=-1, keepdims=True)
-    right = across / width
-    front = origin - sacrum
-    front = front - right * np.sum(front * right, axis=-1, keepdims=True)
-    depth = np.linalg.norm(front, axis=-1, keepdims=True)
-    front = front / depth
+    """Left and right hip joint centres (N, 3) m by Harrington et al. (2007), from iliac spines (N, 3) m on the skin.
+
+    The spines' skin says where the pelvis is and how it is turned; its size is taken from the stature (N,) m, since
+    the span between points of the skin grows with fat: by 14 mm across and 35 mm in depth per standard deviation of
+    the body mass index. Soft tissue is taken to be as thick in front as behind.
+    """
+    width, depth = PELVIS_WIDTH * stature[:, None], PELVIS_DEPTH * stature[:, None]
+    front_middle, back_middle = (left_asis + right_asis) / 2, (left_psis + right_psis) / 2
+    right = _unit(right_asis - left_asis)
+    front = front_middle - back_middle
+    front = _unit(front - right * np.sum(front * right, axis=-1, keepdims=True))
     up = np.cross(right, front)
-    bony = depth - 2 * SKIN_OVER_ILIAC_SPINES
-    middle = (
-        origin
-        + front * (-0.24 * bony - 0.0099 - SKIN_OVER_ILIAC_SPINES)
-        + up * (-0.30 * width - 0.0109)
-    )
+    middle = (front_middle + back_middle) / 2
+    middle = middle + front * (depth / 2 - 0.24 * depth - 0.0099) - up * (0.30 * width + 0.0109)
     aside = right * (0.33 * width + 0.0073)
     return middle - aside, middle + aside
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

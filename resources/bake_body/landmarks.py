@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from resources.bake_body.joint_centres import PELVIS_DEPTH, PELVIS_WIDTH
 from resources.bake_body.picker import Landmark, Picker, mean
 from solver.body.skeleton import INDEX
 
@@ -27,16 +28,15 @@ HEIGHTS = {
     "heel": 0.006,
 }
 """Landmark heights as fractions of stature."""
-PELVIS_WIDTH = 0.140
-"""Distance between the anterior superior iliac spines over stature."""
 SPINES_WIDTH = 0.053
 """Distance between the posterior superior iliac spines over stature."""
 PELVIC_TILT = np.radians(10.0)
 """Forward tilt, in quiet standing, of the plane through the four iliac spines."""
 BIACROMIAL = 0.2245
 """Distance between the acromia over stature."""
-WRIST_BEYOND_RIG = 0.020
-"""m on the mean body, from the rig's wrist to the line of the styloids, which lie past the narrowest forearm."""
+WRIST_BEYOND_RIG = 0.008
+"""m on the mean body, from the rig's wrist to the line of the styloids, just past the narrowest forearm; this leaves
+0.11 of stature for the hand."""
 UP, FRONT, LEFT = np.eye(3)[[1, 2, 0]]
 
 
@@ -100,11 +100,11 @@ def _pelvis(body: Mannequin) -> dict[str, Landmark]:
     """Iliac spines such that the hip joint centre predicted from them lies at the height of the rig's."""
     trunk = body.part("pelvis", "spine1", "spine2", "left_hip", "right_hip")
     width, hip = PELVIS_WIDTH * body.stature, body.joints[INDEX["left_hip"]]
-    # Harrington: the hip lies 0.30 PW + 10.9 mm below and about 0.24 PD + 9.9 mm (46 mm) behind, in the pelvis' own axes.
-    drop = (0.30 * width + 0.0109) * np.cos(PELVIC_TILT) - 0.046 * np.sin(PELVIC_TILT)
+    depth = PELVIS_DEPTH * body.stature
+    behind = 0.24 * depth + 0.0099
+    drop = (0.30 * width + 0.0109) * np.cos(PELVIC_TILT) - behind * np.sin(PELVIC_TILT)
     height = hip[1] + drop
     asis = body.picker.surface(np.array([width / 2, height, hip[2]]), FRONT, trunk)
-    depth = 0.090 * body.stature
     across = SPINES_WIDTH * body.stature / 2
     psis = body.picker.surface(np.array([across, height + depth * np.tan(PELVIC_TILT), 0]), -FRONT, trunk)
     return {"{side}_asis": asis, "{side}_psis": psis}
