@@ -28,7 +28,7 @@ _PEAK_WIDTH = 0.25  # s to either side
 _FRAME_RATES = 30 / 29.97  # the usual lie of a clock
 _DECISIVE = 12.0  # nats that another clock ratio must bring
 # The odds that an offset is right to 0.05 s, against its margin over the best rival: a logistic fit to 400 pairs of
-# recordings (3 to 14 s, whole bodies and limbs, 4 to 47 markers, gaps, a seventh of them of different trials).
+# recordings of 3 to 14 s (benchmarks/sync_confidence.py draws others like them and shows how well it holds).
 _EVEN_ODDS = 7.4  # nats
 _STEEPNESS = 1.8
 
@@ -44,6 +44,7 @@ class Sync:
     confidence : 0..1, how likely the offset is right to 0.05 s
     lags : (L,) s, the offsets that were tried
     score : (L,) nats, the evidence for each; NaN where the recordings hardly overlap
+    margin : nats by which the offset is ahead of every other and of what chance reaches
     method : what found it
     notes : what the user should know, one sentence each
     """
@@ -53,6 +54,7 @@ class Sync:
     confidence: float
     lags: np.ndarray
     score: np.ndarray
+    margin: float = 0.0
     method: str = "canonical correlation of velocities"
     notes: tuple[str, ...] = ()
 
@@ -113,7 +115,7 @@ def find_offset(landmarks: Landmarks, markers: Markers, *, search: tuple[float, 
             f"The motion does not settle the offset between video and markers: {offset:.2f} s is hardly better than "
             f"{rival:.2f} s; give the offset if you know it."
         )
-    return Sync(offset, ratio, confidence, lags, score, notes=tuple(notes))
+    return Sync(offset, ratio, confidence, lags, score, margin, notes=tuple(notes))
 
 
 def _likely(video: np.ndarray, markers: np.ndarray) -> tuple[float, float]:
