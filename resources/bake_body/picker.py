@@ -23,6 +23,7 @@ class Landmark:
         return np.einsum("k,...kd->...d", np.array(self.values), vertices[..., list(self.vertices), :])
 
     def mirrored(self, twin: np.ndarray) -> Landmark:
+        """The landmark on the other side, by each vertex' ``twin``."""
         return Landmark(tuple(int(twin[v]) for v in self.vertices), self.values)
 
 

@@ -1,7 +1,7 @@
 """Arms of average length: the rig's are some 8 % short for their stature.
 
-Targets are joint-to-joint lengths over stature, means of men and women: de Leva 1996 (J Biomech 29:1223) gives 0.160 and
-0.153, ANSUR's acromion-radiale and radiale-stylion lengths lead to 0.164 and 0.150.
+Targets are joint-to-joint lengths over stature, means of men and women: de Leva 1996 (J Biomech 29:1223) gives 0.160
+and 0.153, ANSUR's acromion-radiale and radiale-stylion lengths lead to 0.164 and 0.150.
 """
 
 from __future__ import annotations
@@ -21,10 +21,9 @@ def lengthen_arms(
     joints, vertices = joints.copy(), vertices.copy()
     for (near, far), target in TARGETS.items():
         bones = [(INDEX[f"{side}_{near}"], INDEX[f"{side}_{far}"]) for side in ("left", "right")]
-        length = np.mean(
-            [np.linalg.norm(joints[:, child] - joints[:, joint], axis=-1) for joint, child in bones], axis=0
-        )
-        share = target / np.mean(length / stature) - 1
+        lengths = [np.linalg.norm(joints[:, child] - joints[:, joint], axis=-1) for joint, child in bones]
+        mean = np.mean(lengths / stature)
+        share = target / mean - 1
         for joint, child in bones:
             bone = joints[:, child] - joints[:, joint]
             moved = descendants()[child]
@@ -34,5 +33,5 @@ def lengthen_arms(
             part = weights[:, joint] * along + weights[:, moved].sum(axis=1)
             vertices += share * part[..., None] * bone[:, None]
             joints[:, moved] += share * bone[:, None]
-        print(f"{near} to {far}: {100 * np.mean(length / stature):.2f} % of stature, stretched by {100 * share:.1f} %")
+        print(f"{near} to {far}: {100 * mean:.2f} % of stature, stretched by {100 * share:.1f} %")
     return joints, vertices

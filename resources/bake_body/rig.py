@@ -82,7 +82,7 @@ def main_component(faces: np.ndarray, count: int) -> np.ndarray:
 
 def mirror_vertices(vertices: np.ndarray) -> np.ndarray:
     """(V,) the vertex on the other side of each vertex of a body that is symmetric about x = 0."""
-    distance, twin = cKDTree(vertices).query(vertices * [-1, 1, 1])
+    distance, twin = map(np.asarray, cKDTree(vertices).query(vertices * [-1, 1, 1]))
     if distance.max() > 2e-3 or not np.array_equal(twin[twin], np.arange(len(twin))):
         raise ValueError(f"the mesh is not symmetric: twins are up to {distance.max() * 1000:.1f} mm apart")
     return twin

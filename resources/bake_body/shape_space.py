@@ -38,7 +38,7 @@ def fit_shape_space(points: np.ndarray, mass: np.ndarray) -> ShapeSpace:
     order = np.argsort(variance)[::-1][:COMPONENTS]
     scores = vectors[:, order] * np.sqrt(len(points))
     basis = np.linalg.lstsq(scores, centred, rcond=None)[0]
-    # A beta that raises the head top (or, failing that, adds volume) counts up: the sign is the data's, not the solver's.
+    # A beta that makes the body larger counts up: an eigenvector's sign is arbitrary, the body's growth is not.
     sign = np.where(_growth(basis, mean) < 0, -1.0, 1.0)
     scores, basis = scores * sign, basis * sign[:, None]
     residual = (centred - scores @ basis).reshape(points.shape)
