@@ -17,7 +17,7 @@ FORBIDDEN = {
     "solver": {"app", "widgets", "tests", *QT, *VTK},
     "widgets": {"app", "solver", "tests"},
     "app": {"tests"},
-    "resources": {"app", "widgets", "tests", *QT, *VTK},
+    "resources": {"app", "widgets", "tests", *QT},  # its scripts bake the body and render the embedded video
 }
 HEAVY = {"torch", "open3d", "cv2", "av", "ezc3d", "ai_edge_litert", "matplotlib", "jinja2", *QT, *VTK}
 """What a module may import only inside the function that needs it."""
