@@ -56,7 +56,7 @@ COARSE = (
 )
 FINE = (
     Phase(0.02, 0.08, 3, reassign=True, free_placement=True),
-    Phase(0.015, 0.06, 4, free_placement=True),
+    Phase(0.015, 0.06, 4, reassign=True, free_placement=True),
     Phase(0.01, 0.04, 6, free_placement=True),
 )
 

@@ -56,7 +56,7 @@ class OrientSettings:
 
     refine: int = 4
     offset_mm: float = 9.5
-    offset_spread_mm: float = 5.0
+    offset_spread_mm: float = 6.0
     prior_deg: float = 18.0
     focal_guess: float = 0.85
 

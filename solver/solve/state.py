@@ -114,9 +114,9 @@ class Weights:
     anatomical: float = 0.3
     image: float = 0.025
     image_kernel: float = 3.0
-    shape: float = 0.7
+    shape: float = 1.0
     offset: float = 0.0095
-    offset_spread: float = 0.005
+    offset_spread: float = 0.006
     slide: float = 0.02
     focal_guess: float = 0.85
     focal_spread: float = 0.25
