@@ -13,9 +13,8 @@ from solver.errors import InputError
 from solver.pipeline.request import EvaluateRequest, Outcome, SolveOutcome, SolveRequest, check_inputs
 from solver.progress import Progress
 
-DEMO_SESSION = resource("demo")
-"""A session folder, and beside its inputs the truth they were made from."""
-DEMO_TRUTH = resource("demo", "truth.npz")
+DEMO_MARKERS, DEMO_VIDEO = resource("demo", "session.c3d"), resource("demo", "video.mp4")
+"""The embedded session; the truth that it was made from lies beside it."""
 
 
 def _solve(request: SolveRequest, progress: Progress) -> SolveOutcome:
@@ -30,12 +29,19 @@ def _evaluate(request: EvaluateRequest, progress: Progress) -> Outcome:
     return evaluate_result(request, progress)
 
 
+def _judge_demo(result: Path, progress: Progress) -> Outcome:
+    from solver.demo import judge_demo
+
+    return judge_demo(result, progress)
+
+
 @dataclass(frozen=True)
 class Services:
     """The solver's functions that the commands call, loaded when they are needed."""
 
     solve: Callable[[SolveRequest, Progress], SolveOutcome] = _solve
     evaluate: Callable[[EvaluateRequest, Progress], Outcome] = _evaluate
+    judge_demo: Callable[[Path, Progress], Outcome] = _judge_demo
 
 
 SERVICES = Services()
@@ -52,9 +58,9 @@ def run_solve(options: argparse.Namespace, services: Services) -> int:
 def run_demo(options: argparse.Namespace, services: Services) -> int:
     """``markerscope demo``: the embedded session, then its result against the truth."""
     with Terminal(options) as terminal:
-        request = SolveRequest(markers=DEMO_SESSION, out=options.out)
+        request = SolveRequest(markers=DEMO_MARKERS, video=DEMO_VIDEO, out=options.out)
         solved = _solve_into(request, services, terminal.progress)
-        compared = services.evaluate(EvaluateRequest(solved.out, DEMO_TRUTH), terminal.progress)
+        compared = services.judge_demo(solved.out, terminal.progress)
         terminal.show(
             Outcome(
                 summary={**solved.summary, "evaluation": dict(compared.summary)},

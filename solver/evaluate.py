@@ -112,14 +112,33 @@ def evaluate(
     clock, clock_notes = _clock(found, other)
     own_body, other_body = _body_of(result), Path(body) if body else _body_of(reference)
     bodies = {path: _load_body(path) for path in {own_body, other_body}}
-    ours, notes = _posed(found, _times(found), bodies[own_body], known=own_body is not None)
-    theirs, other_notes = _posed(other, clock, bodies[other_body], known=other_body is not None)
+    ours, notes = posed(found, _times(found), bodies[own_body], known=own_body is not None)
+    theirs, other_notes = posed(other, clock, bodies[other_body], known=other_body is not None)
+    return compare(ours, theirs, measured_markers(result), other.source, (*clock_notes, *notes, *other_notes), progress)
+
+
+def compare(
+    ours: Posed,
+    theirs: Posed,
+    markers: Markers | None,
+    source: str,
+    notes: tuple[str, ...] = (),
+    progress: Progress = silent,
+) -> Evaluation:
+    """Compare a motion with a reference on the same clock.
+
+    Parameters
+    ----------
+    markers : what was measured, None where it is not at hand
+    source : what to call the reference in messages
+    notes : what was assumed so far
+    """
     inside = (ours.time >= theirs.time[0] - 1e-9) & (ours.time <= theirs.time[-1] + 1e-9)
     if inside.sum() < 2:
         a, b, c, d = (f"{t:.2f}" for t in (ours.time[0], ours.time[-1], theirs.time[0], theirs.time[-1]))
         raise InputError(
             f"it covers {c} to {d} s and the result {a} to {b} s, so they do not overlap",
-            other.source,
+            source,
             "compare recordings of the same trial on one clock",
         )
     ours = ours.at(ours.time[inside])
@@ -129,7 +148,6 @@ def evaluate(
     surface = None
     if len(ours.body.template) == len(theirs.body.template):
         surface = metrics.v2v(ours.vertices(frames), theirs.vertices(frames))
-    markers = _markers(result)
     m2s = [
         _to_surface(markers, motion, frames, part_of(progress, 0.3 + 0.35 * i, 0.65 + 0.35 * i))
         for i, motion in enumerate((ours, theirs))
@@ -143,7 +161,7 @@ def evaluate(
         m2s=m2s[0],
         m2s_reference=m2s[1],
         angles=_angles(ours, theirs),
-        notes=(*clock_notes, *notes, *other_notes),
+        notes=notes,
     )
 
 
@@ -177,7 +195,7 @@ def _load_body(path: Path | None) -> Body:
     return with_bone_lengths(Body.load(path))
 
 
-def _posed(motion: MotionFile, time: np.ndarray, body: Body, *, known: bool) -> tuple[Posed, tuple[str, ...]]:
+def posed(motion: MotionFile, time: np.ndarray, body: Body, *, known: bool) -> tuple[Posed, tuple[str, ...]]:
     """The motion on ``body``, which is ``known`` to be its own or only taken to be."""
     betas = np.zeros(body.shape_count)
     own = min(len(motion.betas), body.betas_count)
@@ -194,7 +212,7 @@ def _posed(motion: MotionFile, time: np.ndarray, body: Body, *, known: bool) -> 
     return Posed(body, betas, time, motion.rotations, motion.trans, joints), notes
 
 
-def _markers(result: str | Path) -> Markers | None:
+def measured_markers(result: str | Path) -> Markers | None:
     """The markers that the result was solved from, what was filled in left out; None where they are not at hand."""
     from solver.io.markers_in import load_markers
 

@@ -33,6 +33,7 @@ class Fake:
     def __init__(self, fails: BaseException | None = None) -> None:
         self.solves: list[SolveRequest] = []
         self.evaluations: list[EvaluateRequest] = []
+        self.demos: list[Path] = []
         self.fails = fails
 
     def solve(self, request: SolveRequest, progress: Progress) -> SolveOutcome:
@@ -49,9 +50,13 @@ class Fake:
         self.evaluations.append(request)
         return Outcome(summary={"mpjpe_mm": 12.0}, lines=("MPJPE 12.0 mm.",))
 
+    def judge_demo(self, result: Path, progress: Progress) -> Outcome:
+        self.demos.append(result)
+        return Outcome(summary={"mpjpe_mm": 12.0}, lines=("MPJPE 12.0 mm.",))
+
     @property
     def services(self) -> Services:
-        return Services(self.solve, self.evaluate)
+        return Services(self.solve, self.evaluate, self.judge_demo)
 
 
 @pytest.fixture
@@ -110,12 +115,13 @@ def test_quiet_prints_the_json_alone(markers: Path, tmp_path: Path, capsys) -> N
     assert printed.err == ""
 
 
-def test_demo_solves_the_embedded_session_and_compares_with_the_truth(tmp_path: Path, monkeypatch, capsys) -> None:
-    monkeypatch.setattr(cli_commands, "DEMO_SESSION", tmp_path)
+def test_demo_solves_the_embedded_session_and_compares_with_the_truth(tmp_path: Path, capsys) -> None:
     fake = Fake()
     assert main(["demo", "--headless", "--out", str(tmp_path / "out"), "--json"], fake.services) == 0
-    assert fake.solves == [SolveRequest(tmp_path, out=tmp_path / "out")]
-    assert fake.evaluations == [EvaluateRequest(tmp_path / "out", cli_commands.DEMO_TRUTH)]
+    assert fake.solves == [
+        SolveRequest(cli_commands.DEMO_MARKERS, video=cli_commands.DEMO_VIDEO, out=tmp_path / "out")
+    ]
+    assert fake.demos == [tmp_path / "out"]
     printed = capsys.readouterr().out
     assert "Against the known truth:\nMPJPE 12.0 mm." in printed
     assert json.loads(printed.splitlines()[-1])["evaluation"] == {"mpjpe_mm": 12.0}
