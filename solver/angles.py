@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
@@ -12,8 +12,10 @@ import numpy as np
 
 from resources import resource
 from solver.body.anatomy import SEGMENT_JOINT, segment_frames
-from solver.body.skeleton import INDEX, PARENTS
+from solver.body.skeleton import INDEX, JOINTS, PARENTS
+from solver.cardan import about_axes, cardan
 from solver.markers import lab_rotation
+from solver.rotations import exp_so3
 
 Convention = Literal["opensim", "isb", "gait2392", "visual3d", "plugin-gait"]
 
@@ -30,7 +32,24 @@ _PAIRS = {
 """Proximal and distal segment of each joint; the pelvis is read in the lab."""
 _MIDLINE = ("", "pelvis", "thorax")
 _MIRROR = np.array([1.0, 1, -1])
-_SINGULAR_DEG = 4.0
+_CARRIERS = {
+    "pelvis": ("pelvis",),
+    # The shoulder girdle and the lower ribs ride on the thorax nearly rigidly.
+    "thorax": ("spine3", "spine2", "left_collar", "right_collar"),
+    **{
+        f"{side}_{segment}": tuple(f"{side}_{joint}" for joint in joints)
+        for side in ("left", "right")
+        for segment, joints in {
+            "thigh": ("hip",),
+            "shank": ("knee",),
+            "foot": ("ankle", "foot"),
+            "upper_arm": ("shoulder",),
+            "forearm": ("elbow",),
+            "hand": ("wrist", "hand"),
+        }.items()
+    },
+}
+"""The bones on which a marker shows how a segment moves."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +75,7 @@ class JointAngles:
     degrees : (T, A), unwrapped over time
     singular : (T, A) True where the sequence cannot tell this angle from another: its value means nothing there
     convention, title : which convention, and what it is
-    sequence : A, the intrinsic sequence that each angle is part of
+    sequence : A, the intrinsic sequence, or the axes, that each angle is part of
     positive : A, what a positive value means
     zero_pose : what the angles are counted from
     """
@@ -79,7 +98,10 @@ def conventions() -> dict[str, Any]:
 
 
 def joint_angles(
-    time: np.ndarray, rotations: np.ndarray, landmarks: Mapping[str, np.ndarray], joints: np.ndarray,
+    time: np.ndarray,
+    rotations: np.ndarray,
+    landmarks: Mapping[str, np.ndarray],
+    joints: np.ndarray,
     settings: AngleSettings,
 ) -> JointAngles:
     """Angles of a posed body.
@@ -92,35 +114,123 @@ def joint_angles(
     settings : which convention
     """
     convention = conventions()[settings.convention]
-    frames = segment_frames(landmarks, joints, upright_trunk=convention["pelvis"] == "upright")
+    frames = segment_frames(
+        landmarks,
+        joints,
+        upright_trunk=convention["pelvis"] == "upright",
+        ulnar_forearm=convention["forearm"] == "ulna",
+    )
     turn = world_rotations(rotations)
     segments = {name: turn[:, INDEX[SEGMENT_JOINT[name]]] @ frame for name, frame in frames.items()}
-    # The lab as OpenSim has it: X along the internal x, Y up.
-    segments[""] = np.broadcast_to(lab_rotation("y").T, (len(turn), 3, 3))
-    columns: list[tuple[str, np.ndarray, np.ndarray, str, str]] = []
-    for joint, row in convention["joints"].items():
-        for side in ("",) if set(_PAIRS[joint]) <= set(_MIDLINE) else ("right", "left"):
-            near, far = (name if name in _MIDLINE else f"{side}_{name}" for name in _PAIRS[joint])
-            relative = np.swapaxes(segments[near], -1, -2) @ segments[far]
-            if side == "left" and convention["mirror"]:
-                relative = _MIRROR[:, None] * relative * _MIRROR
-            angles, singular = cardan(relative, row["sequence"])
-            for k, name in enumerate(row["columns"]):
-                if name:
-                    named = name.format(s=side[:1], S=side[:1].upper())
-                    columns.append((named, row["signs"][k] * angles[:, k], singular[:, k], row["sequence"], row["positive"][k]))
-    names, values, flags, sequences, positive = zip(*columns, strict=True)
+    return read_angles(time, segments, settings)
+
+
+def read_angles(time: np.ndarray, segments: Mapping[str, np.ndarray], settings: AngleSettings) -> JointAngles:
+    """Angles between anatomical segment frames, wherever these come from.
+
+    Parameters
+    ----------
+    time : (T,) s
+    segments : (T, 3, 3) frame of each segment in the internal lab, named as in ``SEGMENT_JOINT``; columns X anterior,
+        Y proximal, Z to the right
+    settings : which convention
+    """
+    convention = conventions()[settings.convention]
+    lab = _lab(segments["pelvis"], convention["lab"] == "quarter turns")
+    columns = list(_columns(settings.convention))
+    values, flags = np.zeros((2, len(time), len(columns)))
+    for i, column in enumerate(columns):
+        near = segments[column.near] if column.near else lab
+        relative = np.swapaxes(near, -1, -2) @ segments[column.far]
+        if column.mirrored:
+            relative = _MIRROR[:, None] * relative * _MIRROR
+        angles, singular = (
+            cardan(relative, column.sequence) if column.axes is None else about_axes(relative, column.axes)
+        )
+        values[:, i], flags[:, i] = column.sign * angles[:, column.place], singular[:, column.place]
     return JointAngles(
         time=time,
-        names=names,
-        degrees=np.stack(values, axis=1),
-        singular=np.stack(flags, axis=1),
+        names=tuple(column.name for column in columns),
+        degrees=values,
+        singular=flags.astype(bool),
         convention=settings.convention,
         title=convention["title"],
-        sequence=sequences,
-        positive=positive,
+        sequence=tuple(column.sequence for column in columns),
+        positive=tuple(column.positive for column in columns),
         zero_pose=convention["zero_pose"],
     )
+
+
+def evidence(convention: str, marker_joint: np.ndarray) -> dict[str, str]:
+    """What each angle of a convention rests on, by column name.
+
+    "markers": both segments carry some (the pelvis in the lab: it does); "one segment": one of the two does; "video
+    only": neither, so that the angle is the video's guess, bent by the markers on other segments.
+
+    Parameters
+    ----------
+    marker_joint : (M,) index of the joint whose bone each marker sits on, -1 for none
+    """
+    marked = {JOINTS[j] for j in np.unique(marker_joint) if j >= 0}
+    words = {0: "video only", 1: "one segment", 2: "markers"}
+    found = {}
+    for column in _columns(convention):
+        shown = [bool(marked & set(_CARRIERS[name])) for name in (column.near or column.far, column.far)]
+        found[column.name] = words[sum(shown)]
+    return found
+
+
+@dataclass(frozen=True)
+class _Column:
+    """One angle of a convention: rotation ``place`` of the sequence between two segments, or about given axes."""
+
+    name: str
+    near: str
+    far: str
+    mirrored: bool
+    sequence: str
+    axes: np.ndarray | None
+    place: int
+    sign: int
+    positive: str
+
+
+def _columns(convention: str) -> Iterator[_Column]:
+    about = conventions()[convention]
+    for joint, row in about["joints"].items():
+        axes = np.array(row["axes"]) if "axes" in row else None
+        two_sided = any("{" in column for column in row["columns"])
+        for side in ("right", "left") if two_sided else ("",):
+            near, far = (part if part in _MIDLINE else f"{side}_{part}" for part in _PAIRS[joint])
+            for place, column in enumerate(row["columns"]):
+                if column:
+                    yield _Column(
+                        name=column.format(s=side[:1], S=side[:1].upper()),
+                        near=near,
+                        far=far,
+                        mirrored=side == "left" and about["mirror"],
+                        sequence=row["sequence"] if axes is None else f"about {np.round(axes, 3).tolist()}",
+                        axes=axes,
+                        place=place,
+                        sign=row["signs"][place],
+                        positive=row["positive"][place],
+                    )
+
+
+def _lab(pelvis: np.ndarray, quarter_turns: bool) -> np.ndarray:
+    """(3, 3) the lab's axes in the internal frame: X along the internal x, Y up, Z to the right of X.
+
+    Parameters
+    ----------
+    pelvis : (T, 3, 3) the pelvis' frame in the internal lab
+    quarter_turns : turn X to whichever of the four horizontal directions the pelvis faces most
+    """
+    lab = lab_rotation("y").T
+    if not quarter_turns:
+        return lab
+    ahead = pelvis[:, :, 0].mean(axis=0)
+    quarters = np.round(np.arctan2(ahead[1], ahead[0]) / (np.pi / 2))
+    return exp_so3(np.array([0, 0, quarters * np.pi / 2])) @ lab
 
 
 def world_rotations(rotations: np.ndarray) -> np.ndarray:
@@ -129,32 +239,3 @@ def world_rotations(rotations: np.ndarray) -> np.ndarray:
     for j in range(1, rotations.shape[1]):
         turn[:, j] = turn[:, PARENTS[j]] @ rotations[:, j]
     return turn
-
-
-def cardan(rotations: np.ndarray, sequence: str) -> tuple[np.ndarray, np.ndarray]:
-    """Intrinsic angles (T, 3) in degrees, unwrapped over time, and (T, 3) True where they are not defined.
-
-    For a sequence that begins and ends with the same axis the middle angle is taken as negative, as ISB does for the
-    shoulder. Near a singularity the first and the third angle cannot be told apart; the middle one stays good.
-    """
-    import warnings
-
-    from scipy.spatial.transform import Rotation
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # gimbal lock is flagged below
-        angles = Rotation.from_matrix(rotations).as_euler(sequence, degrees=True)
-    same = sequence[0] == sequence[2]
-    if same:
-        angles = np.stack([angles[:, 0] + 180, -angles[:, 1], angles[:, 2] + 180], axis=1)
-    distance = np.abs(np.sin(np.radians(angles[:, 1]))) if same else np.abs(np.cos(np.radians(angles[:, 1])))
-    lost = distance < np.sin(np.radians(_SINGULAR_DEG))
-    singular = np.stack([lost, np.zeros_like(lost), lost], axis=1)
-    good = ~lost
-    for k in (0, 2):
-        known = np.flatnonzero(good)
-        if len(known):
-            angles[known, k] = np.unwrap(angles[known, k], period=360)
-            # the turn that starts nearest to zero
-            angles[known, k] -= 360 * np.round(np.median(angles[known, k]) / 360)
-    return angles, singular

@@ -36,7 +36,7 @@ SEGMENT_JOINT = {
 
 
 def segment_frames(
-    landmarks: Mapping[str, np.ndarray], joints: np.ndarray, *, upright_trunk: bool
+    landmarks: Mapping[str, np.ndarray], joints: np.ndarray, *, upright_trunk: bool, ulnar_forearm: bool = False
 ) -> dict[str, np.ndarray]:
     """Anatomical frame (3, 3) of every segment in the rest body's axes; columns X, Y, Z.
 
@@ -46,6 +46,7 @@ def segment_frames(
     joints : (24, 3) m joint centres, likewise
     upright_trunk : take pelvis and thorax as they stand in the rest pose; else from iliac spines and from sternum and
         spine, as ISB says
+    ulnar_forearm : let the forearm's long axis end at the ulnar styloid, as ISB says, not in the middle of the wrist
     """
     at = {name: joints[i] for name, i in INDEX.items()}
     frames = {"pelvis": UPRIGHT, "thorax": UPRIGHT} if upright_trunk else _trunk(landmarks)
@@ -64,7 +65,8 @@ def segment_frames(
         elbow_axis = across("elbow_lateral", "elbow_medial")
         frames[f"{side}_upper_arm"] = _along(at[f"{side}_shoulder"] - at[f"{side}_elbow"], elbow_axis)
         wrist_axis = across("wrist_radius", "wrist_ulna")
-        frames[f"{side}_forearm"] = _along(at[f"{side}_elbow"] - at[f"{side}_wrist"], wrist_axis)
+        far = landmarks[f"{side}_wrist_ulna"] if ulnar_forearm else at[f"{side}_wrist"]
+        frames[f"{side}_forearm"] = _along(at[f"{side}_elbow"] - far, wrist_axis)
         frames[f"{side}_hand"] = _along(at[f"{side}_wrist"] - at[f"{side}_hand"], wrist_axis)
     return frames
 

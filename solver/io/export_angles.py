@@ -15,12 +15,18 @@ from solver.angles import JointAngles
 from solver.io.atomic import write_text_atomic
 
 
-def write_angles(folder: str | Path, angles: JointAngles, provenance: Mapping[str, Any]) -> None:
+def write_angles(
+    folder: str | Path,
+    angles: JointAngles,
+    provenance: Mapping[str, Any],
+    evidence: Mapping[str, str] | None = None,
+) -> None:
     """Write ``angles.csv`` (time in s, one column per angle in degrees, empty where singular) and ``angles.json``.
 
     Parameters
     ----------
     provenance : program version, digests of the inputs, settings of every stage
+    evidence : what each angle rests on, by column name, as ``solver.angles.evidence`` gives it
     """
     folder = Path(folder)
     write_text_atomic(folder / "angles.csv", angles_csv(angles))
@@ -30,7 +36,13 @@ def write_angles(folder: str | Path, angles: JointAngles, provenance: Mapping[st
         "zero_pose": angles.zero_pose,
         "units": {"time": "s", "angles": "degrees"},
         "angles": [
-            {"column": name, "sequence": sequence, "positive": positive, "singular_frames": int(flags.sum())}
+            {
+                "column": name,
+                "sequence": sequence,
+                "positive": positive,
+                "singular_frames": int(flags.sum()),
+                **({} if evidence is None else {"evidence": evidence[name]}),
+            }
             for name, sequence, positive, flags in zip(
                 angles.names, angles.sequence, angles.positive, angles.singular.T, strict=True
             )
