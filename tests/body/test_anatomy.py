@@ -1,0 +1,95 @@
+"""Segment frames: square on a square body, right-handed and mirrored on the real one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.body.anatomy import SEGMENT_JOINT, UPRIGHT, segment_frames
+from solver.body.bones import with_bone_lengths
+from solver.body.model import Body
+from solver.body.skeleton import INDEX
+
+ACROSS = np.diag([-1.0, 1, 1])
+
+
+@pytest.fixture(scope="module")
+def body() -> Body:
+    return with_bone_lengths(Body.load())
+
+
+def frames_of(body: Body, betas: np.ndarray, *, isb: bool) -> dict[str, np.ndarray]:
+    return segment_frames(body.landmarks(betas), body.joints(betas), upright_trunk=not isb, ulnar_forearm=isb)
+
+
+@pytest.mark.parametrize("isb", [False, True])
+def test_frames_are_right_handed_rotations_of_every_segment(body: Body, isb: bool) -> None:
+    rng = np.random.default_rng(0)
+    for betas in (np.zeros(body.shape_count), rng.normal(0, 1, body.shape_count)):
+        frames = frames_of(body, betas, isb=isb)
+        assert set(frames) == set(SEGMENT_JOINT)
+        for name, frame in frames.items():
+            assert np.abs(frame.T @ frame - np.eye(3)).max() < 1e-9 and np.linalg.det(frame) > 0, name
+
+
+@pytest.mark.parametrize("isb", [False, True])
+def test_left_frames_are_the_right_ones_mirrored(body: Body, isb: bool) -> None:
+    """Both sides have Z to the subject's right, so a mirrored left frame is the right one with Z reversed."""
+    frames = frames_of(body, np.zeros(body.shape_count), isb=isb)
+    for name in ("thigh", "shank", "foot", "upper_arm", "forearm", "hand"):
+        expected = ACROSS @ frames[f"left_{name}"] @ np.diag([1, 1, -1])
+        error = np.degrees(np.abs(expected - frames[f"right_{name}"]).max())
+        assert error < 0.05, f"{name} differs by {error:.3f} degrees"
+
+
+def test_axes_point_where_they_should(body: Body) -> None:
+    """In the rest pose (x left, y up, z ahead): legs stand, arms lie out to the sides with the palms down."""
+    frames = frames_of(body, np.zeros(body.shape_count), isb=True)
+    standing = {
+        "pelvis": 15,
+        "thorax": 15,
+        **{f"{s}_{n}": 6 for s in ("left", "right") for n in ("thigh", "shank", "foot")},
+    }
+    for name, allowed in standing.items():
+        off = np.degrees(np.arccos((np.trace(UPRIGHT.T @ frames[name]) - 1) / 2))
+        assert off < allowed, f"{name} stands {off:.1f} degrees off"
+    up, ahead = np.array([0.0, 1, 0]), np.array([0.0, 0, 1])
+    for side, outwards in (("left", np.array([1.0, 0, 0])), ("right", np.array([-1.0, 0, 0]))):
+        to_radius = 1 if side == "right" else -1  # Z points to the right; the thumb does so on the right hand
+        for name, expected in (("upper_arm", up), ("forearm", ahead), ("hand", ahead)):
+            frame = frames[f"{side}_{name}"]
+            assert frame[:, 1] @ -outwards > np.cos(np.radians(10)), f"{side} {name}: Y is not proximal"
+            off = np.degrees(np.arccos(to_radius * frame[:, 2] @ expected))
+            assert off < 12, f"{side} {name}: Z is {off:.1f} degrees off"
+
+
+def test_the_trunk_as_isb_defines_it() -> None:
+    """Wu et al. 2002 and 2005, on points with round numbers."""
+    points = {
+        "left_asis": np.array([0.12, 1.0, 0.1]),
+        "right_asis": np.array([-0.12, 1.0, 0.1]),
+        "left_psis": np.array([0.04, 1.03, -0.06]),
+        "right_psis": np.array([-0.04, 1.03, -0.06]),
+        "sternum_ij": np.array([0, 1.45, 0.08]),
+        "c7": np.array([0, 1.5, -0.08]),
+        "sternum_px": np.array([0, 1.25, 0.12]),
+        "t8": np.array([0, 1.25, -0.08]),
+    }
+    body = Body.load()
+    rest = np.zeros(body.shape_count)
+    frames = segment_frames({**body.landmarks(rest), **points}, body.joints(rest), upright_trunk=False)
+    slope = np.arctan2(0.03, 0.16)
+    expected = np.array([[0, 0, -1], [-np.sin(slope), np.cos(slope), 0], [np.cos(slope), np.sin(slope), 0]])
+    assert np.abs(frames["pelvis"] - expected).max() < 1e-12, "the pelvis tips forward with the plane of its spines"
+    long_axis = np.array([0, 1.475 - 1.25, 0.0 - 0.02])
+    assert np.abs(frames["thorax"][:, 1] - long_axis / np.linalg.norm(long_axis)).max() < 1e-12
+    assert np.abs(frames["thorax"][:, 2] - [-1, 0, 0]).max() < 1e-12
+
+
+def test_the_forearm_ends_where_asked(body: Body) -> None:
+    betas = np.zeros(body.shape_count)
+    joints, landmarks = body.joints(betas), body.landmarks(betas)
+    for isb, end in ((True, landmarks["right_wrist_ulna"]), (False, joints[INDEX["right_wrist"]])):
+        along = joints[INDEX["right_elbow"]] - end
+        found = frames_of(body, betas, isb=isb)["right_forearm"][:, 1]
+        assert np.abs(found - along / np.linalg.norm(along)).max() < 1e-12
