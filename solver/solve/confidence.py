@@ -12,6 +12,8 @@ from solver.solve.state import Observations
 _SAME_BONES = 0.8
 _SAME_TURN_DEG = 35.0
 _STILL_DEG = 12.0
+_TIE = 1.15
+_STEEPNESS = 1.75 / np.log(_TIE)
 
 
 def judge(candidates: tuple[Candidate, ...], seen: Observations, found: Localization) -> Orientation:
@@ -27,12 +29,17 @@ def judge(candidates: tuple[Candidate, ...], seen: Observations, found: Localiza
             f"The person hardly moves (joints turn by {moved:.0f} degrees in the video), so markers cannot be told "
             "apart by their motion: check which bones they were given to."
         )
-    if rivals and margin < 1.15:
+    if rivals and margin < _TIE:
         warnings.append(_tie(best, candidates[runner_up], margin))
-    confidence = float(1 / (1 + np.exp(-(np.log(max(margin, 1e-9)) / np.log(1.15)) * np.log(19)))) if rivals else 0.99
+    confidence = _sure(margin) if rivals else 0.99
     if moved < _STILL_DEG:
         confidence = min(confidence, 0.6)
     return Orientation(candidates, float(margin), runner_up, confidence, tuple(warnings))
+
+
+def _sure(margin: float) -> float:
+    """0..1 from how much more the next different answer costs: 0.5 for a tie, 0.85 at 1.15, 0.99 at 1.5."""
+    return float(1 / (1 + max(margin, 1e-9) ** -_STEEPNESS))
 
 
 def same_answer(one: Candidate, other: Candidate) -> bool:
