@@ -548,3 +548,29 @@ def test_every_bone_bears_on_some_angle_or_none(convention: str) -> None:
     for joint in range(len(JOINTS)):
         for column, word in evidence(convention, np.array([joint])).items():
             assert order[word] <= order[everything[column]]
+
+
+# -- what the documentation says -------------------------------------------------------------------------------
+
+
+def documented(convention: str) -> str:
+    """The table of one convention in ``docs/angles.md``, from the conventions as data."""
+    lines = ["| joint | sequence | column | positive |", "| --- | --- | --- | --- |"]
+    for joint, row in conventions()[convention]["joints"].items():
+        about = row.get("sequence", "two axes")
+        for name, sign, axis, positive in zip(
+            row["columns"], row["signs"], row.get("sequence", "12"), row["positive"], strict=False
+        ):
+            if name:
+                shown = name.replace("{s}", "r").replace("{S}", "R")
+                turn_of = f"{'+' if sign > 0 else '-'}{axis}" if "sequence" in row else f"axis {axis}"
+                lines.append(f"| {joint} | {about} | `{shown}` ({turn_of}) | {positive} |")
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_the_documentation_tells_the_conventions_as_they_are(convention: str) -> None:
+    page = (Path(__file__).parents[1] / "docs" / "angles.md").read_text(encoding="utf-8")
+    chapter = page.split(f"### `{convention}`")[1].split("\n#")[0]
+    assert documented(convention) in chapter, f"docs/angles.md should hold\n{documented(convention)}"
+    assert conventions()[convention]["title"] in chapter
