@@ -3,59 +3,112 @@
 from __future__ import annotations
 
 import json
+import os
+import secrets
+import shutil
 from collections.abc import Mapping
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from solver import __version__
+from solver.angles import world_rotations
 from solver.body.skeleton import BONES, JOINTS, PARENTS
+from solver.errors import InputError
 from solver.filling import filled_by_body
-from solver.io.atomic import write_text_atomic
+from solver.io.atomic import cannot_write, make_folder, write_text_atomic
 from solver.io.camera import FILE_NAME as CAMERA
 from solver.io.camera import write_camera
 from solver.io.export_smpl import write_smpl_npz
 from solver.markers import Markers
+from solver.pipeline.digest import canonical, file_digest
 from solver.pipeline.session import Session
 from solver.pipeline.stage import GraphRun
+from solver.pipeline.stages import GRAPH
 from solver.rotations import log_so3
 from solver.solve.results import FittedMotion
 
-_MADE = "results/outputs.json"
-_FILES = (
+FILES = (
     "angles.csv",
     "angles.json",
     "angles.mot",
     "motion.npz",
     "motion.bvh",
-    CAMERA,
     "markers_labelled.c3d",
     "markers_labelled.trc",
     "report.html",
 )
+"""Written by every solve."""
+SOMETIMES = (CAMERA, "markers_labelled.filled.csv")
+"""Written where there was a video, and where gaps were filled."""
+_STAMP = "outputs.json"
 
 
 def write_outputs(session: Session, graph: GraphRun) -> None:
-    """Write every output file, unless they are there already from the same results."""
-    made = {"program": __version__, **graph.keys}
-    stamp = session.folder / _MADE
-    if all((session.folder / name).exists() for name in _FILES) and _read(stamp) == made:
+    """Write every output file, unless they are there as they were written from the same results.
+
+    They are made in a folder of their own first: where that fails, none of them is touched.
+
+    Raises
+    ------
+    InputError : the file system refuses
+    """
+    about = provenance(session, graph)
+    stamp = session.store.root / _STAMP
+    known = _read(stamp)
+    if known.get("from") == about and _as_written(session.folder, known.get("files")):
         return
-    stamp.unlink(missing_ok=True)
-    _write(session.folder, session, graph)
-    write_text_atomic(stamp, json.dumps(made, indent=1) + "\n")
-
-
-def _read(path: Path) -> Any:
+    # A name that the store clears away, whatever ends this process.
+    staging = make_folder(session.store.root / "outputs" / f".tmp-{os.getpid()}-{secrets.token_hex(4)}")
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        _write(staging, session, graph, about)
+        made = {path.name: file_digest(path) for path in sorted(staging.iterdir())}
+        stamp.unlink(missing_ok=True)
+        _move(staging, session.folder, set(made))
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+        with suppress(OSError):
+            staging.parent.rmdir()
+    write_text_atomic(stamp, json.dumps({"from": about, "files": made}, indent=1) + "\n")
+
+
+def _read(stamp: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(stamp.read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        return None
+        return {}
+    return content if isinstance(content, dict) else {}
 
 
-def _write(folder: Path, session: Session, graph: GraphRun) -> None:
+def _as_written(folder: Path, files: Any) -> bool:
+    """Whether all files are there and hold what was written."""
+    if not isinstance(files, dict) or not set(FILES) <= set(files):
+        return False
+    return all((folder / name).is_file() and file_digest(folder / name) == digest for name, digest in files.items())
+
+
+def _move(staging: Path, folder: Path, names: set[str]) -> None:
+    """Put finished files in their places, and take away those of an earlier solve that this one has not."""
+    for name in (*FILES, *SOMETIMES):
+        target = folder / name
+        try:
+            if name in names:
+                os.replace(staging / name, target)
+            else:
+                target.unlink(missing_ok=True)
+        except PermissionError as error:
+            raise InputError(
+                "cannot be replaced", target, "close the program that has it open, or choose another folder"
+            ) from error
+        except OSError as error:
+            raise cannot_write(target, error) from error
+
+
+def _write(folder: Path, session: Session, graph: GraphRun, about: Mapping[str, Any]) -> None:
+    from solver.angles import evidence
     from solver.body.bones import with_bone_lengths
     from solver.body.model import Body
     from solver.io.export_angles import write_angles
@@ -68,40 +121,39 @@ def _write(folder: Path, session: Session, graph: GraphRun) -> None:
     markers, motion, angles = graph["markers"], graph["fit"], graph["angles"]
     body_file = session.inputs.get("body_file")
     body = with_bone_lengths(Body.load(body_file.path if body_file else None))
-    about = provenance(session, graph)
-    write_angles(folder, angles, about)
+    named = labelled(markers, motion)
+    write_angles(folder, angles, about, evidence(angles.convention, motion.marker_joint))
     write_mot(folder / "angles.mot", angles.time, (angles.names, np.where(angles.singular, np.nan, angles.degrees)))
     write_motion(folder / "motion.npz", markers, motion, body.betas_count)
-    write_camera(folder / CAMERA, motion.camera)
-    named = labelled(markers, motion)
+    if motion.camera.image_size != (0, 0):
+        write_camera(folder / CAMERA, motion.camera)
     write_c3d(folder / "markers_labelled.c3d", named)
     write_trc(folder / "markers_labelled.trc", named)
     rest = body.joints(motion.betas)
     offsets = np.concatenate([np.zeros((1, 3)), rest[1:] - rest[PARENTS[1:]]])
-    write_bvh(
-        folder / "motion.bvh", JOINTS, PARENTS, offsets, motion.rotations, motion.joints[:, 0], markers.rate
-    )
+    write_bvh(folder / "motion.bvh", JOINTS, PARENTS, offsets, motion.rotations, motion.joints[:, 0], markers.rate)
     report_of(folder / "report.html", session, graph, named, about)
 
 
 def write_motion(path: Path, markers: Markers, motion: FittedMotion, betas_count: int) -> None:
-    """The fitted body in AMASS layout, with joints and marker places; arrays as DESIGN.md's contract names them."""
-    arrays: dict[str, Any] = {
-        "poses": log_so3(motion.rotations).reshape(len(motion.time), -1),
-        "trans": motion.trans,
-        "betas": motion.betas[:betas_count],
-        "bone_lengths": motion.betas[betas_count:],
-        "gender": np.array("neutral"),
-        "joints": motion.joints,
-        "joint_names": np.array(JOINTS),
-        "R_lab_internal": markers.R_lab_internal,
-        "marker_joint": motion.marker_joint,
-        "marker_vertex": motion.marker_vertex,
-        "marker_labels": np.array(markers.labels),
-        "time": motion.time,
-    }
-    poses, trans, betas = (arrays.pop(name) for name in ("poses", "trans", "betas"))
-    write_smpl_npz(path, poses, trans, betas, markers.rate, arrays)
+    """The fitted body in AMASS layout, with joints and marker places."""
+    write_smpl_npz(
+        path,
+        poses=log_so3(motion.rotations).reshape(len(motion.time), -1),
+        trans=motion.trans,
+        betas=motion.betas[:betas_count],
+        rate=markers.rate,
+        extra={
+            "bone_lengths": motion.betas[betas_count:],
+            "joints": motion.joints,
+            "joint_names": np.array(JOINTS),
+            "R_lab_internal": markers.R_lab_internal,
+            "marker_joint": motion.marker_joint,
+            "marker_vertex": motion.marker_vertex,
+            "marker_labels": np.array(markers.labels),
+            "time": motion.time,
+        },
+    )
 
 
 def labelled(markers: Markers, motion: FittedMotion) -> Markers:
@@ -109,29 +161,26 @@ def labelled(markers: Markers, motion: FittedMotion) -> Markers:
 
     Along a bone they are numbered from its joint outwards, so that the same layout gets the same names in every trial.
     """
-    filled = filled_by_body(markers, motion.placed)
-    middle = np.nanmedian(
-        np.linalg.norm(motion.placed - motion.joints[:, np.clip(motion.marker_joint, 0, None)], axis=2), 0
-    )
+    bones = world_rotations(motion.rotations)[:, np.clip(motion.marker_joint, 0, None)]
+    filled = filled_by_body(markers, motion.placed, bones)
     names = [f"unassigned_{label}" for label in markers.labels]
     for j, joint in enumerate(JOINTS):
         on_bone = np.flatnonzero(motion.marker_joint == j)
-        for number, m in enumerate(on_bone[np.argsort(middle[on_bone], kind="stable")], start=1):
+        reach = np.linalg.norm(motion.placed[:, on_bone] - motion.joints[:, [j]], axis=2)
+        for number, m in enumerate(on_bone[np.argsort(np.median(reach, axis=0), kind="stable")], start=1):
             names[m] = f"{BONES[joint]}_{number}"
     return replace(filled, labels=tuple(names))
 
 
 def provenance(session: Session, graph: GraphRun) -> dict[str, Any]:
     """What was computed from what: program, inputs with digests, every stage's settings and key."""
-    from solver.pipeline.digest import canonical
-    from solver.pipeline.stages import GRAPH
-
     settings = session.stage_settings(GRAPH)
     inputs: Mapping[str, Any] = {
         name: {"file": file.path.name, "sha256": file.digest} for name, file in session.inputs.items()
     }
     return {
         "program": f"markerscope {__version__}",
+        **asdict(session.run),
         "inputs": inputs,
         "stages": {
             stage.name: {
@@ -141,5 +190,5 @@ def provenance(session: Session, graph: GraphRun) -> dict[str, Any]:
             }
             for stage in GRAPH
         },
-        "edits": {name: dict(table) for name, table in session.edits.items()},
+        "edits": canonical(session.edits),
     }

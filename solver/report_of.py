@@ -129,10 +129,7 @@ def _curves(angles: JointAngles) -> tuple[AngleCurve, ...]:
     """One curve per angle, left and right together."""
     columns: dict[str, dict[str, int]] = {}
     for i, name in enumerate(angles.names):
-        title, side = name, ""
-        for end, meaning in (("_r", "right"), ("_l", "left"), ("Right", "right"), ("Left", "left")):
-            if name.endswith(end):
-                title, side = name.removesuffix(end), meaning
+        title, side = _title_and_side(name, angles.names)
         columns.setdefault(title, {})[side] = i
     curves = []
     for title, sides in columns.items():
@@ -140,9 +137,20 @@ def _curves(angles: JointAngles) -> tuple[AngleCurve, ...]:
         if not any(np.isfinite(v).any() for v in values.values()):
             continue
         flagged = np.any([angles.singular[:, i] for i in sides.values()], axis=0)
-        words = title.replace("_", " ")
-        curves.append(AngleCurve(words[:1].upper() + words[1:], "degrees", angles.time, values, flagged))
+        curves.append(AngleCurve(title, "degrees", angles.time, values, flagged))
     return tuple(curves)
+
+
+def _title_and_side(name: str, names: tuple[str, ...]) -> tuple[str, str]:
+    """What a column is of, and of which side: conventions put ``_r`` at the end or ``R`` at the start."""
+    words = name.replace("_", " ")
+    for end, side in (("_r", "right"), ("_l", "left")):
+        if name.endswith(end):
+            return words[:1].upper() + words[1:-2], side
+    for start, other, side in (("R", "L", "right"), ("L", "R", "left")):
+        if name.startswith(start) and other + name[1:] in names:
+            return words[1:], side
+    return words[:1].upper() + words[1:], ""
 
 
 def _said(value: Any) -> str:

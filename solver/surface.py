@@ -19,8 +19,8 @@ class SurfaceDistance:
 
     Attributes
     ----------
-    mean, median : m, over all markers and the frames looked at
-    per_marker : (M,) m, mean; NaN for markers never seen in them
+    mean, median : m, over the markers that the fit used and the frames looked at
+    per_marker : (M,) m, mean of every marker; NaN for those never seen in these frames
     frames : the frame numbers looked at, evenly spread
     """
 
@@ -33,17 +33,22 @@ class SurfaceDistance:
 def surface_distance(
     body: Body, motion: FittedMotion, positions: np.ndarray, progress: Progress = silent
 ) -> SurfaceDistance:
-    """Unsigned distance of every marker (T, M, 3) m to the closest point of the posed body."""
+    """Unsigned distance of every marker to the closest point of the posed body.
+
+    Parameters
+    ----------
+    body : with bone lengths among its shape coefficients
+    positions : (T, M, 3) m, NaN = lost
+    """
     from solver.metrics import marker_to_surface
 
     count = len(positions)
     frames = np.unique(np.linspace(0, count - 1, min(count, _MOST_FRAMES)).round().astype(int))
     vertices, _ = body.pose(motion.rotations[frames], motion.betas, motion.trans[frames])
     distance = marker_to_surface(positions[frames], vertices, body.faces, progress=progress)
-    with np.errstate(invalid="ignore"):
-        seen = np.isfinite(distance)
-        per_marker = np.where(seen, distance, 0).sum(0) / np.where(seen.any(0), seen.sum(0), np.nan)
-    known = distance[seen]
+    seen = np.isfinite(distance)
+    per_marker = np.where(seen, distance, 0).sum(0) / np.where(seen.any(0), seen.sum(0), np.nan)
+    known = distance[seen & (motion.marker_joint >= 0)]
     if not len(known):
         return SurfaceDistance(float("nan"), float("nan"), per_marker, frames)
     return SurfaceDistance(float(known.mean()), float(np.median(known)), per_marker, frames)

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from solver.errors import InputError
 from solver.io.atomic import write_text_atomic
+from solver.io.text import read_bytes
 from solver.solve.results import CameraResult
 
 FILE_NAME = "camera.json"
 _REMEDY = "name the result folder of a solve with a video, or its camera.json"
+_SAME_ASPECT = 0.01
 
 
 def camera_file(path: str | Path) -> Path:
     """The camera file that a path means: itself, or the one in a result folder."""
     path = Path(path)
-    return path / FILE_NAME if path.is_dir() else path
+    if not path.is_dir():
+        return path
+    if not (path / FILE_NAME).is_file():
+        raise InputError(f"the folder holds no {FILE_NAME}", path, _REMEDY)
+    return path / FILE_NAME
 
 
 def write_camera(path: str | Path, camera: CameraResult) -> None:
@@ -36,20 +43,51 @@ def write_camera(path: str | Path, camera: CameraResult) -> None:
 
 
 def read_camera(path: str | Path) -> CameraResult:
-    """Read what ``write_camera`` wrote."""
+    """Read what ``write_camera`` wrote.
+
+    Raises
+    ------
+    InputError : there is none, or it is no proper camera
+    """
     path = camera_file(path)
+    data = read_bytes(path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(data.decode("utf-8"))
         turn = np.array(content["R_lab_cam"], dtype=float)
         position = np.array(content["position_m"], dtype=float)
-        size = tuple(int(v) for v in content["image_size_px"])
+        width, height = (int(v) for v in content["image_size_px"])
         focal = float(content["focal_px"])
         error = content.get("reprojection_px")
-    except FileNotFoundError as problem:
-        raise InputError("there is no camera", path, _REMEDY) from problem
-    except (OSError, ValueError, TypeError, KeyError) as problem:
+        error = float("nan") if error is None else float(error)
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as problem:
         raise InputError("is not a camera file", path, _REMEDY) from problem
     proper = turn.shape == (3, 3) and np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0
-    if not proper or position.shape != (3,) or not np.isfinite(position).all() or not focal > 0 or len(size) != 2:
+    placed = position.shape == (3,) and np.isfinite(position).all()
+    if not (proper and placed and 0 < focal < np.inf and width > 0 and height > 0):
         raise InputError("holds no proper camera", path, _REMEDY)
-    return CameraResult(turn, position, focal, (size[0], size[1]), float("nan") if error is None else float(error))
+    return CameraResult(turn, position, focal, (width, height), error)
+
+
+def resized(camera: CameraResult, image_size: tuple[int, int], where: str | Path) -> CameraResult:
+    """The same camera with the pictures it takes in another resolution.
+
+    Parameters
+    ----------
+    image_size : (width, height) px; (0, 0) if no picture is looked at
+    where : the camera's file, for the message
+
+    Raises
+    ------
+    InputError : the picture has another shape, so it was not this camera that took it
+    """
+    if image_size in (camera.image_size, (0, 0)):
+        return camera
+    (width, height), (own_width, own_height) = image_size, camera.image_size
+    scale = width / own_width
+    if abs(height / (own_height * scale) - 1) > _SAME_ASPECT:
+        raise InputError(
+            f"is the camera of a video of {own_width} x {own_height} pixels, and this video has {width} x {height}",
+            where,
+            "give the camera of a trial that was filmed in the same way",
+        )
+    return replace(camera, focal=camera.focal * scale, image_size=image_size)

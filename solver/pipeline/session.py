@@ -15,6 +15,7 @@ from solver import __version__
 from solver.errors import InputError
 from solver.io.atomic import make_folder, write_text_atomic
 from solver.pipeline.digest import DigestCache
+from solver.pipeline.request import Method
 from solver.pipeline.settings import from_table, overlay, to_table
 from solver.pipeline.stage import Source, Stage
 from solver.pipeline.store import Store
@@ -22,7 +23,7 @@ from solver.pipeline.store import Store
 SCHEMA = 1
 FILE_NAME = "session.toml"
 SUFFIX = ".markerscope"
-_START_AGAIN = "correct it, or start again from the markers"
+_START_AGAIN = "correct it, or delete it and start again from the markers"
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,20 @@ class InputFile:
 
     path: Path
     digest: str = ""
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """What holds for the solve as a whole.
+
+    Attributes
+    ----------
+    method : how the body is fitted
+    seed : of every random choice
+    """
+
+    method: Method = "bundle"
+    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -43,12 +58,14 @@ class Session:
     inputs : files by the name of the graph's source; one that is not there was not given
     settings : tables by stage
     edits : what the user decided by hand, tables by stage, laid over ``settings``
+    run : what holds for the solve as a whole
     """
 
     folder: Path
     inputs: Mapping[str, InputFile] = field(default_factory=dict)
     settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     edits: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    run: RunSettings = RunSettings()
 
     @property
     def store(self) -> Store:
@@ -82,7 +99,7 @@ class Session:
         found = {}
         for name in names:
             given = self.inputs.get(name)
-            if given is not None and not given.path.is_file():
+            if given is not None and not given.path.exists():
                 raise InputError(
                     f"the {name.removesuffix('_file')} file of {self.folder / FILE_NAME} is not there any more",
                     given.path,
@@ -112,6 +129,7 @@ def save_session(session: Session) -> None:
     content = {
         "schema": SCHEMA,
         "program": f"markerscope {__version__}",
+        "run": to_table(session.run),
         "inputs": inputs,
         "settings": {name: dict(table) for name, table in session.settings.items()},
         "edits": {name: dict(table) for name, table in session.edits.items()},
@@ -144,7 +162,10 @@ def load_session(path: str | Path) -> Session:
         raise InputError(f"was written by {program}, which this version cannot read", file, "update Markerscope")
     tables = {name: _tables(content.get(name, {}), name, file) for name in ("inputs", "settings", "edits")}
     inputs = {name: _input_file(table, name, folder, file) for name, table in tables["inputs"].items()}
-    return Session(folder, inputs, tables["settings"], tables["edits"])
+    run = content.get("run", {})
+    if not isinstance(run, dict):
+        raise InputError("[run] is not a table", file, _START_AGAIN)
+    return Session(folder, inputs, tables["settings"], tables["edits"], from_table(RunSettings, run, f"{file}, run"))
 
 
 def _tables(value: Any, name: str, file: Path) -> dict[str, dict[str, Any]]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,115 +14,181 @@ import numpy as np
 
 from solver.errors import InputError
 from solver.io.camera import camera_file
+from solver.pipeline.output import remove_if_empty
 from solver.pipeline.request import SolveOutcome, SolveRequest
 from solver.pipeline.session import InputFile, Session, load_session, save_session, session_folder
-from solver.pipeline.stage import GraphRun, run_graph, stage_keys
+from solver.pipeline.settings import UNSET, overlay
+from solver.pipeline.stage import GraphRun, OnEvent, ignore, run_graph
 from solver.pipeline.stages import GRAPH, SOURCES
-from solver.progress import Progress, part_of
+from solver.progress import Progress, part_of, silent
+from solver.solve.results import Candidate
+
+_WORTH_KEEPING_S = 5.0
+"""Work that took longer than this is kept where a later stage refuses an input: the next attempt begins there."""
 
 
-def solve_session(request: SolveRequest, progress: Progress) -> SolveOutcome:
+def solve_session(request: SolveRequest, progress: Progress = silent, on_event: OnEvent | None = None) -> SolveOutcome:
     """Everything from markers and a video to angles; what is cached is not computed again.
+
+    Parameters
+    ----------
+    progress : told the fraction done
+    on_event : told when a stage begins, ends, fails, or was in the store
 
     Raises
     ------
     InputError : an input cannot be used; nothing half-written is left
     """
     session = session_of(request)
-    sources = session.sources(SOURCES)
-    if sources["video_file"].value is None and sources["prior_file"].value is None:
+    if not {"video_file", "prior_file"} & set(session.inputs):
         raise InputError(
             "there is neither a video nor a pose prior", request.markers, "give one with --video or --prior"
         )
-    settings = session.stage_settings(GRAPH)
-    graph = run_graph(GRAPH, sources, settings, session.store, progress=part_of(progress, 0.0, 0.97))
-    session = replace(
-        session,
-        inputs={name: replace(file, digest=sources[name].digest) for name, file in session.inputs.items()},
-    ).with_settings(settings)
-    save_session(session)
-    progress(0.97, "writing results")
-    from solver.outputs import write_outputs
+    with _tidy(session):
+        sources, settings = session.sources(SOURCES), session.stage_settings(GRAPH)
+        session = _spelt_out(session, {name: source.digest for name, source in sources.items()})
+        graph = run_graph(
+            GRAPH, sources, settings, session.store, progress=part_of(progress, 0.0, 0.97), on_event=on_event or ignore
+        )
+        progress(0.97, "writing results")
+        from solver.outputs import write_outputs
 
-    write_outputs(session, graph)
+        write_outputs(session, graph)
+        _save(session)
     progress(1.0, "done")
     return _outcome(session, graph)
 
 
 def session_of(request: SolveRequest) -> Session:
-    """The session that a request makes or opens, with the request's options laid over its settings."""
+    """The session that a request makes or opens, with the request's inputs and options laid over its own.
+
+    Raises
+    ------
+    InputError : a file is not there, or the session cannot be read
+    """
     folder = session_folder(request.markers)
+    out = None if request.out is None else Path(os.path.abspath(request.out))
     if folder is not None:
         session = load_session(folder)
-        if request.out is not None:
-            session = replace(session, folder=Path(request.out).absolute())
+        session = session if out is None else replace(session, folder=out)
+    elif request.markers.is_dir():
+        raise InputError(
+            "is a folder without a session in it", request.markers, "name a marker file, or a folder that solve wrote"
+        )
+    elif out is None:
+        raise InputError("no folder for the results was named", remedy="add --out DIR")
     else:
-        assert request.out is not None
-        out = Path(request.out).absolute()
-        # The command line says everything again; what the user decided by hand in this folder is kept.
-        edits = _edits_for(load_session(out), request) if session_folder(out) is not None else {}
-        session = _with_input(Session(out, edits=edits), "marker_file", request.markers)
-    for name, path in (
-        ("video_file", request.video),
-        ("prior_file", request.prior),
-        ("camera_file", None if request.camera is None else camera_file(request.camera)),
-        ("body_file", request.body),
-    ):
+        session = _with_input(_again(out, request), "marker_file", request.markers)
+    for name in ("video", "prior", "camera", "body"):
+        path = getattr(request, name)
         if path is not None:
-            session = _with_input(session, name, path)
+            session = _with_input(session, f"{name}_file", camera_file(path) if name == "camera" else path)
     return _with_options(session, request)
 
 
-def _edits_for(session: Session, request: SolveRequest) -> Mapping[str, Mapping[str, Any]]:
-    """Decisions by hand belong to the marker file they were made on."""
-    before = session.inputs.get("marker_file")
-    same = before is not None and before.path.absolute() == Path(request.markers).absolute()
-    return session.edits if same else {}
+def _again(out: Path, request: SolveRequest) -> Session:
+    """A session made from files: they and the options say everything anew.
+
+    Where this folder has been solved into before, what the user decided by hand on the same marker file is kept.
+    """
+    if session_folder(out) is None:
+        return Session(out)
+    before = load_session(out)
+    known = before.inputs.get("marker_file")
+    same = known is not None and known.path == Path(os.path.abspath(request.markers))
+    return Session(out, edits=before.edits if same else {})
 
 
 def _with_input(session: Session, name: str, path: Path) -> Session:
-    return replace(session, inputs={**session.inputs, name: InputFile(Path(path).absolute())})
+    if not path.exists():
+        raise InputError(f"there is no such {name.removesuffix('_file')} file", path, "check the name and the folder")
+    if path.is_dir():
+        raise InputError(f"is a folder, not a {name.removesuffix('_file')} file", path, "name the file in it")
+    return replace(session, inputs={**session.inputs, name: InputFile(Path(os.path.abspath(path)))})
 
 
 def _with_options(session: Session, request: SolveRequest) -> Session:
-    """The request's options over the session's settings."""
-    start, stop = request.range or (None, None)
+    """The request's options over the session's settings, and over its edits: what is said last counts."""
+    settings, edits = dict(session.settings), dict(session.edits)
+    for stage, said in _said(request).items():
+        settings[stage] = overlay(settings.get(stage, {}), said)
+        edits[stage] = _without(edits.get(stage, {}), {*said, *said.get(UNSET, ())})
+    run = {name: getattr(request, name) for name in ("method", "seed") if getattr(request, name) is not None}
+    return replace(
+        session,
+        settings=settings,
+        edits={stage: table for stage, table in edits.items() if table},
+        run=replace(session.run, **run),
+    )
+
+
+def _said(request: SolveRequest) -> dict[str, dict[str, Any]]:
+    """The options of a request as tables of settings; what it does not say is not in them."""
     options: dict[str, dict[str, Any]] = {
         "markers": {
             "up": request.up,
             "units": request.units,
             "subject": request.subject,
             "rate": request.marker_rate,
-            "start": start,
-            "stop": stop,
         },
         "sync": {"offset": request.offset, "rate_ratio": request.rate_ratio},
         "angles": {"convention": request.convention},
     }
-    settings = {name: dict(table) for name, table in session.settings.items()}
-    for stage, table in options.items():
-        chosen = {name: value for name, value in table.items() if value is not None}
-        if chosen:
-            merged = {**settings.get(stage, {}), **chosen}
-            unset = [name for name in merged.get("unset", []) if name not in chosen]
-            settings[stage] = {k: v for k, v in merged.items() if k != "unset"} | ({"unset": unset} if unset else {})
-    return replace(session, settings=settings)
+    said = {
+        stage: {name: value for name, value in table.items() if value is not None} for stage, table in options.items()
+    }
+    if request.range is not None:  # says both ends: one that is left out is open
+        ends = dict(zip(("start", "stop"), request.range))
+        said["markers"] |= {name: end for name, end in ends.items() if end is not None}
+        said["markers"][UNSET] = [name for name, end in ends.items() if end is None]
+    return {stage: table for stage, table in said.items() if table}
 
 
-def current_keys(session: Session) -> dict[str, str]:
-    """Key of every stage as the session stands."""
-    return stage_keys(GRAPH, session.sources(SOURCES), session.stage_settings(GRAPH))
+def _without(table: Mapping[str, Any], names: set[str]) -> dict[str, Any]:
+    """A table of edits that no longer says anything of these settings."""
+    kept = {name: value for name, value in table.items() if name not in (UNSET, *names)}
+    unset = [name for name in table.get(UNSET, ()) if name not in names]
+    return kept | ({UNSET: unset} if unset else {})
+
+
+def _spelt_out(session: Session, digests: Mapping[str, str]) -> Session:
+    """The session with every setting and what its inputs hold; edits stay apart, so that they can be taken back."""
+    inputs = {name: replace(file, digest=digests[name]) for name, file in session.inputs.items()}
+    plain = replace(session, inputs=inputs, edits={}).stage_settings(GRAPH)
+    return replace(session, inputs=inputs).with_settings(plain)
+
+
+def _save(session: Session) -> None:
+    """Save the session, unless its file says the same already."""
+    if session_folder(session.folder) is None or load_session(session.folder) != session:
+        save_session(session)
+
+
+@contextmanager
+def _tidy(session: Session) -> Iterator[None]:
+    """Where an input is refused, leave the folder as it was, but for work worth keeping."""
+    store = session.store
+    new_folder, new_store = not session.folder.exists(), not store.root.exists()
+    try:
+        yield
+    except InputError:
+        seconds = sum(float(entry.about.get("seconds", 0)) for entry in store.list())
+        if new_store and seconds < _WORTH_KEEPING_S:
+            shutil.rmtree(store.root, ignore_errors=True)
+            if new_folder:
+                remove_if_empty(session.folder)
+        raise
 
 
 def _outcome(session: Session, graph: GraphRun) -> SolveOutcome:
     motion, ranked, sync, surface = graph["fit"], graph["orient"], graph["sync"], graph["surface"]
     markers = graph["markers"]
     best = ranked.candidates[motion.chosen]
-    seconds = {name: round(event.seconds, 3) for name, event in graph.events.items()}
     summary = {
         "out": str(session.folder),
-        "seconds": seconds,
+        "seconds": {name: round(event.seconds, 3) for name, event in graph.events.items()},
         "computed": list(graph.computed),
+        "method": session.run.method,
         "frames": len(motion.time),
         "markers": len(markers.labels),
         "part": best.part,
@@ -127,14 +196,17 @@ def _outcome(session: Session, graph: GraphRun) -> SolveOutcome:
         "energy": best.energy,
         "margin": ranked.margin if np.isfinite(ranked.margin) else None,
         "confidence": motion.confidence,
-        "alternatives": [
-            {"part": c.part, "heading_deg": c.heading_deg, "energy": c.energy} for c in ranked.candidates if c.refined
-        ],
+        "runner_up": None if ranked.runner_up < 0 else _brief(ranked.candidates[ranked.runner_up]),
+        "alternatives": [_brief(candidate) for candidate in ranked.candidates if candidate.refined],
         "sync": {"offset_s": sync.offset, "rate_ratio": sync.rate_ratio, "confidence": sync.confidence},
         "m2s_mm": 1000 * surface.mean,
         "residual_median_mm": float(1000 * np.nanmedian(motion.residual)),
     }
-    lines = [f"{name}: {graph.events[name].text}." for name in graph.events if graph.events[name].text]
+    lines = [f"{name}: {event.text}." for name, event in graph.events.items() if event.text]
     lines.append(f"Results are in {session.folder}.")
-    warnings = (*markers.notes, *sync.notes, *graph["prior"].notes, *motion.warnings)
-    return SolveOutcome(summary=summary, lines=tuple(lines), warnings=tuple(warnings), out=session.folder)
+    warnings = (*markers.notes, *graph["prior"].notes, *sync.notes, *motion.warnings)
+    return SolveOutcome(summary=summary, lines=tuple(lines), warnings=warnings, out=session.folder)
+
+
+def _brief(candidate: Candidate) -> dict[str, Any]:
+    return {"part": candidate.part, "heading_deg": candidate.heading_deg, "energy": candidate.energy}

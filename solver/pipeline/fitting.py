@@ -1,0 +1,95 @@
+"""The stages that fit the body and read it off: pure functions of what the stages before them found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from solver.angles import AngleSettings, JointAngles
+from solver.pipeline.stage import NoSettings
+from solver.progress import Progress
+from solver.segment import Segmentation, SegmentSettings
+from solver.solve.method import FitSettings, LocalizeSettings, OrientSettings
+from solver.solve.results import CameraResult, FittedMotion, Localization, Orientation
+from solver.surface import SurfaceDistance
+
+if TYPE_CHECKING:
+    from solver.body.model import Body
+    from solver.solve.kinematics import Points
+    from solver.solve.state import Observations
+
+
+def group_markers(given: Mapping[str, Any], settings: SegmentSettings, progress: Progress) -> Segmentation:
+    """Markers that move together."""
+    from solver.segment import segment
+
+    return segment(given["markers"], settings, progress)
+
+
+def _scene(given: Mapping[str, Any]) -> tuple[Body, Observations, Points]:
+    """The body with free bone lengths, what was observed on the markers' clock, and the landmarks' body points."""
+    from solver.solve.observe import observe
+
+    body, sync = _body(given), given["sync"]
+    seen, points = observe(given["markers"], given["prior"], given["landmarks"], body, sync.offset, sync.rate_ratio)
+    return body, seen, points
+
+
+def _camera(path: Path | None, image_size: tuple[int, int]) -> CameraResult | None:
+    """The camera of another trial, as it sees this video."""
+    from solver.io.camera import read_camera, resized
+
+    return None if path is None else resized(read_camera(path), image_size, path)
+
+
+def place_markers(given: Mapping[str, Any], settings: LocalizeSettings, progress: Progress) -> Localization:
+    """Hypotheses of where on the body the markers sit."""
+    from solver.solve.method import localize
+
+    body, seen, _ = _scene(given)
+    left_out = given["segment"].clusters < 0
+    return localize(body, seen, left_out, settings, _camera(given["camera_file"], seen.image_size))
+
+
+def rank_placements(given: Mapping[str, Any], settings: OrientSettings, progress: Progress) -> Orientation:
+    """The hypotheses fitted and ranked."""
+    from solver.solve.method import orient
+
+    body, seen, points = _scene(given)
+    camera = _camera(given["camera_file"], seen.image_size)
+    return orient(body, seen, points, given["localize"], settings, camera, progress)
+
+
+def fit_every_frame(given: Mapping[str, Any], settings: FitSettings, progress: Progress) -> FittedMotion:
+    """The chosen answer carried to every frame."""
+    from solver.solve.method import fit
+
+    body, seen, points = _scene(given)
+    time = given["markers"].time
+    return fit(body, seen, points, given["localize"], given["orient"], time, settings, progress)
+
+
+def _body(given: Mapping[str, Any]) -> Body:
+    """The body with free bone lengths."""
+    from solver.body.bones import with_bone_lengths
+    from solver.body.model import Body
+
+    return with_bone_lengths(Body.load(given["body_file"]))
+
+
+def read_angles(given: Mapping[str, Any], settings: AngleSettings, progress: Progress) -> JointAngles:
+    """Joint angles of the fitted body."""
+    from solver.angles import joint_angles
+
+    body, motion = _body(given), given["fit"]
+    return joint_angles(
+        motion.time, motion.rotations, body.landmarks(motion.betas), body.joints(motion.betas), settings
+    )
+
+
+def measure_surface(given: Mapping[str, Any], settings: NoSettings, progress: Progress) -> SurfaceDistance:
+    """How far the markers are from the fitted skin."""
+    from solver.surface import surface_distance
+
+    return surface_distance(_body(given), given["fit"], given["markers"].positions, progress)

@@ -1,0 +1,261 @@
+"""A session through its life: solved, asked again, changed, edited by hand, opened in another process."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver.body.bones import with_bone_lengths
+from solver.body.model import Body
+from solver.errors import InputError
+from solver.pipeline import solve_session
+from solver.pipeline.request import SolveRequest
+from solver.pipeline.session import load_session, save_session
+from solver.pipeline.settings import from_table
+from solver.pipeline.solve import session_of
+from solver.pipeline.stage import Event, Source, stage_keys
+from solver.pipeline.stages import GRAPH, SOURCES
+from solver.pipeline.worker import Job
+from solver.progress import silent
+from tests.solve.conftest import simulate
+from tests.synthetic import Recording, record, session
+
+TINY = {"localize": {"yaws": 6, "few": 4, "many": 6, "keep": 3}, "orient": {"refine": 2}}
+FITTED = {"localize", "orient", "fit", "angles", "surface"}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    return record(
+        tmp_path_factory.mktemp("recording"), simulate(with_bone_lengths(Body.load()), 5, frames=80, markers=24)
+    )
+
+
+@pytest.fixture(scope="module")
+def solved(made: Recording, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A solved session, not to be changed; ``mine`` is a copy that may be."""
+    out = tmp_path_factory.mktemp("solved") / "out"
+    solve_session(session(out, made, TINY, prior=made.prior, offset=made.offset), silent)
+    return out
+
+
+@pytest.fixture
+def mine(solved: Path, made: Recording, tmp_path: Path) -> Path:
+    shutil.copytree(solved, tmp_path / "out")
+    save_session(replace(load_session(solved), folder=tmp_path / "out"))
+    return tmp_path / "out"
+
+
+def computed(request: SolveRequest) -> set[str]:
+    return set(solve_session(request, silent).summary["computed"])
+
+
+def content(folder: Path) -> dict[str, tuple[int, bytes]]:
+    """Time of change and bytes of every file, but for the note of the inputs' digests."""
+    return {
+        str(path.relative_to(folder)): (path.stat().st_mtime_ns, path.read_bytes())
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != "digests.json"
+    }
+
+
+def edited(folder: Path, edits: Mapping[str, Mapping[str, Any]]) -> SolveRequest:
+    save_session(replace(load_session(folder), edits=edits))
+    return SolveRequest(folder)
+
+
+@pytest.mark.parametrize(
+    ("stage", "name", "value", "changed"),
+    [
+        ("markers", "start", 0.5, {"markers", "segment", "sync"} | FITTED),
+        ("landmarks", "rate", 15.0, {"landmarks", "prior", "sync"} | FITTED),
+        ("prior", "rate", 25.0, {"prior", "sync"} | FITTED),
+        ("sync", "offset", 0.2, {"sync"} | FITTED),
+        ("segment", "threshold", 0.01, {"segment"} | FITTED),
+        ("localize", "keep", 5, FITTED),
+        ("orient", "offset_mm", 12.0, FITTED - {"localize"}),
+        ("fit", "candidate", 1, {"fit", "angles", "surface"}),
+        ("angles", "convention", "isb", {"angles"}),
+    ],
+)
+def test_a_setting_changes_what_depends_on_it(stage: str, name: str, value: Any, changed: set[str]) -> None:
+    sources = {source: Source.file(None) for source in SOURCES}
+    (cls,) = (s.settings for s in GRAPH if s.name == stage)
+    before = stage_keys(GRAPH, sources, {})
+    after = stage_keys(GRAPH, sources, {stage: from_table(cls, {name: value})})
+    assert {key for key in before if before[key] != after[key]} == changed
+
+
+@pytest.mark.parametrize(
+    ("source", "changed"),
+    [
+        ("marker_file", {"markers", "segment", "sync"} | FITTED),
+        ("video_file", {"landmarks", "prior", "sync"} | FITTED),
+        ("prior_file", {"prior", "sync"} | FITTED),
+        ("camera_file", FITTED),
+        ("body_file", FITTED),
+    ],
+)
+def test_an_input_changes_what_depends_on_it(source: str, changed: set[str]) -> None:
+    sources = {name: Source.file(None) for name in SOURCES}
+    before = stage_keys(GRAPH, sources, {})
+    after = stage_keys(GRAPH, {**sources, source: Source(None, "another")}, {})
+    assert {key for key in before if before[key] != after[key]} == changed
+
+
+def test_the_second_time_nothing_is_computed_nor_written(mine: Path) -> None:
+    before = content(mine)
+    assert computed(SolveRequest(mine)) == set()
+    assert content(mine) == before
+
+
+def test_another_convention_computes_the_angles_alone_and_going_back_nothing(mine: Path) -> None:
+    first = (mine / "angles.csv").read_bytes()
+    assert computed(SolveRequest(mine, convention="isb")) == {"angles"}
+    assert b"knee_flexion_r" in (mine / "angles.csv").read_bytes()
+    assert json.loads((mine / "angles.json").read_text())["convention"] == "isb"
+    assert computed(SolveRequest(mine)) == set(), "what was asked for stays in the session"
+    assert computed(SolveRequest(mine, convention="opensim")) == set()
+    assert (mine / "angles.csv").read_bytes() == first
+
+
+@pytest.mark.parametrize("name", ["motion.npz", "markers_labelled.trc", "report.html"])
+def test_a_file_that_is_gone_or_damaged_is_written_again(mine: Path, name: str) -> None:
+    first = (mine / name).read_bytes()
+    (mine / name).unlink()
+    assert computed(SolveRequest(mine)) == set()
+    assert (mine / name).is_file()
+    (mine / name).write_bytes(b"half")
+    assert computed(SolveRequest(mine)) == set()
+    assert len((mine / name).read_bytes()) == pytest.approx(len(first), rel=0.05)
+
+
+def test_a_result_that_is_gone_or_damaged_is_computed_again(mine: Path) -> None:
+    shutil.rmtree(mine / "results" / "angles")
+    assert computed(SolveRequest(mine)) == {"angles"}
+    (arrays,) = (mine / "results" / "surface").glob("*/arrays.npz")
+    arrays.write_bytes(arrays.read_bytes()[:-1])
+    assert computed(SolveRequest(mine)) == {"surface"}
+
+
+def test_a_pinned_candidate_is_used_and_can_be_let_go(mine: Path) -> None:
+    first = content(mine)
+    outcome = solve_session(edited(mine, {"fit": {"candidate": 1}}), silent)
+    assert set(outcome.summary["computed"]) == {"fit", "angles", "surface"}
+    assert any("pinned by hand" in warning for warning in outcome.warnings)
+    assert json.loads((mine / "angles.json").read_text())["edits"] == {"fit": {"candidate": 1}}
+    assert computed(SolveRequest(mine)) == set(), "the pin stays"
+    assert computed(edited(mine, {})) == set(), "without it, the first answer is back"
+    assert content(mine)["motion.npz"][1] == first["motion.npz"][1]
+
+
+def test_a_marker_left_out_is_not_used(mine: Path) -> None:
+    outcome = solve_session(edited(mine, {"segment": {"left_out": [3]}}), silent)
+    assert set(outcome.summary["computed"]) == {"segment"} | FITTED
+    with np.load(mine / "motion.npz") as motion:
+        assert motion["marker_joint"][3] == motion["marker_vertex"][3] == -1
+        assert (np.delete(motion["marker_joint"], 3) >= 0).all()
+    assert "unassigned_M03" in (mine / "markers_labelled.trc").read_text()
+
+
+def test_solving_the_same_markers_into_the_same_folder_keeps_what_was_decided_by_hand(
+    mine: Path, made: Recording, tmp_path: Path
+) -> None:
+    edited(mine, {"segment": {"left_out": [3]}, "sync": {"offset": 0.5}})
+    again = SolveRequest(made.markers, out=mine, prior=made.prior)
+    assert session_of(again).edits == {"segment": {"left_out": [3]}, "sync": {"offset": 0.5}}
+    assert session_of(again).settings == {}, "the command line says everything anew"
+    said = session_of(replace(again, offset=0.1))
+    assert said.edits == {"segment": {"left_out": [3]}}, "what is said last counts"
+    assert said.stage_settings(GRAPH)["sync"].offset == 0.1
+    shutil.copy(made.markers, tmp_path / "other.c3d")
+    assert session_of(replace(again, markers=tmp_path / "other.c3d")).edits == {}
+
+
+def test_a_range_says_both_ends(mine: Path) -> None:
+    first = replace(load_session(mine), settings={"markers": {"start": 1.0, "stop": 2.0}})
+    save_session(first)
+    settings = session_of(SolveRequest(mine, range=(0.5, None))).stage_settings(GRAPH)["markers"]
+    assert (settings.start, settings.stop) == (0.5, None)
+    settings = session_of(SolveRequest(mine)).stage_settings(GRAPH)["markers"]
+    assert (settings.start, settings.stop) == (1.0, 2.0)
+
+
+def test_method_and_seed_are_kept_and_change_nothing_that_does_not_draw_lots(mine: Path) -> None:
+    assert computed(SolveRequest(mine, method="bundle", seed=7)) == set()
+    assert load_session(mine).run.seed == 7
+    assert json.loads((mine / "angles.json").read_text())["seed"] == 7
+    assert session_of(SolveRequest(mine)).run.seed == 7
+
+
+def test_every_stage_is_told(mine: Path) -> None:
+    told: list[Event] = []
+    shutil.rmtree(mine / "results" / "angles")
+    solve_session(SolveRequest(mine), silent, told.append)
+    assert [(e.state, e.computed) for e in told if e.stage == "angles"] == [("running", False), ("cached", True)]
+    assert {e.stage for e in told} == {stage.name for stage in GRAPH}
+    assert all(e.text for e in told if e.stage == "fit")
+
+
+def test_another_process_can_do_it(mine: Path) -> None:
+    job = Job(solve_session, SolveRequest(mine), store=load_session(mine).store)
+    messages = list(job.messages())
+    assert messages[-1].value.summary["computed"] == []
+    assert sum(isinstance(message, Event) for message in messages) == len(GRAPH)
+
+
+def test_a_session_solved_into_another_folder_leaves_its_own_as_it_was(mine: Path, tmp_path: Path) -> None:
+    before = content(mine)
+    shutil.copytree(mine / "results", tmp_path / "new" / "results")
+    outcome = solve_session(SolveRequest(mine, out=tmp_path / "new"), silent)
+    assert outcome.summary["computed"] == [] and outcome.out == tmp_path / "new"
+    assert (tmp_path / "new" / "angles.csv").read_bytes() == (mine / "angles.csv").read_bytes()
+    assert content(mine) == before
+
+
+def test_outputs_change_all_together_or_not_at_all(mine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = content(mine)
+
+    def full(*_: Any) -> None:
+        raise InputError("cannot be written: the disk is full", "report.html", "free some space")
+
+    monkeypatch.setattr("solver.report_of.report_of", full)
+    with pytest.raises(InputError, match="disk is full"):
+        solve_session(SolveRequest(mine, convention="isb"), silent)
+    after = content(mine)
+    assert {name: after[name] for name in before} == before
+    assert {name.split("/")[1] for name in after.keys() - before.keys()} == {"angles"}, "only the finished stage"
+
+
+@pytest.mark.parametrize("worth", [0.0, 1e9])
+def test_a_refusal_leaves_nothing_but_what_took_long(
+    made: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, worth: float
+) -> None:
+    monkeypatch.setattr("solver.pipeline.solve._WORTH_KEEPING_S", worth)
+    request = SolveRequest(made.markers, out=tmp_path / "out", prior=made.prior, offset=100.0)
+    with pytest.raises(InputError, match="at no time of the markers"):
+        solve_session(request, silent)
+    assert (tmp_path / "out" / "results" / "markers").exists() == (worth == 0)
+    assert (tmp_path / "out").exists() == (worth == 0)
+
+
+def test_a_refusal_leaves_an_earlier_result_alone(mine: Path) -> None:
+    before = content(mine)
+    with pytest.raises(InputError, match="at no time of the markers"):
+        solve_session(SolveRequest(mine, offset=100.0), silent)
+    after = content(mine)
+    assert after == before
+
+
+def test_camera_of_an_earlier_solve_with_a_video_goes_with_it(mine: Path) -> None:
+    (mine / "camera.json").write_text("{}")
+    (mine / "angles.csv").unlink()
+    solve_session(SolveRequest(mine), silent)
+    assert not (mine / "camera.json").exists()
