@@ -50,7 +50,7 @@ def bake(sample: source.Sample) -> dict[str, np.ndarray]:
     vertices = (vertices + vertices[:, twin] * flip) / 2
     rigged = rig.merge_joints(sample)
     rigged = (rigged + rigged[:, other] * flip) / 2
-    weights = rig.merge_weights(sample)[kept]
+    weights = rig.smooth_weights(rig.merge_weights(sample)[kept], faces)
     weights = rig.top_weights((weights + weights[twin][:, other]) / 2)
     inner = _inner_vertices(faces, sample.inner_faces[on_skin], len(kept))
 

@@ -4,12 +4,14 @@
 hip      Harrington et al. 2007 (J Biomech 40:595), from the pelvis' place and tilt on the mesh and its average size
 knee     midway between the femoral epicondyles (ISB, Wu et al. 2002)
 ankle    midway between the malleoli (ISB, Wu et al. 2002)
+foot     midway between back and sole of the foot at the head of the second metatarsal
 shoulder centre of the humeral head under the acromion: 12 % of the biacromial width down, 3 % inward, 2 % forward.
          Acromion (8 mm), subacromial space (10), the head's radius (24) and skin (4) make 46 mm, 12 % of an average
          380 mm; de Leva 1996 (J Biomech 29:1223) has 35 mm, Rab et al. 2002 (Gait Posture 15:182) 17 % from a
          marker's centre, some 55 mm from the skin
 elbow    midway between the humeral epicondyles (ISB, Wu et al. 2005)
 wrist    midway between the radial and ulnar styloids (ISB, Wu et al. 2005)
+hand     head of the third metacarpal, two fifths of the way from the back of the hand to the palm
 ======== =====================================================================================================
 """
 
@@ -22,6 +24,17 @@ from solver.body.skeleton import INDEX
 
 PELVIS_WIDTH, PELVIS_DEPTH = 0.140, 0.092
 """Over stature: between the front iliac spines (237 mm at 1.69 m), and from their middle to that of the rear ones."""
+MIDWAY = (
+    ("knee", "knee_lateral", "knee_medial"),
+    ("ankle", "ankle_lateral", "ankle_medial"),
+    ("foot", "toe", "toe_plantar"),
+    ("elbow", "elbow_lateral", "elbow_medial"),
+    ("wrist", "wrist_radius", "wrist_ulna"),
+    ("hand", "hand_meta3", "hand_meta3_palmar"),
+)
+"""Joints between two landmarks each."""
+KNUCKLE = 0.4
+"""How deep the head of the third metacarpal lies between back and palm of the hand, which is padded."""
 SHOULDER = {"inward": 0.03, "down": 0.12, "forward": 0.02}
 """Humeral head from the acromion, over the biacromial width."""
 
@@ -35,13 +48,10 @@ def correct(joints: np.ndarray, vertices: np.ndarray, landmarks: dict[str, Landm
     width = np.linalg.norm(at["left_acromion"] - at["right_acromion"], axis=-1)
     for i, (side, sign) in enumerate((("left", 1.0), ("right", -1.0))):
         moved[:, INDEX[f"{side}_hip"]] = hips[i]
-        for joint, one, other in (
-            ("knee", "knee_lateral", "knee_medial"),
-            ("ankle", "ankle_lateral", "ankle_medial"),
-            ("elbow", "elbow_lateral", "elbow_medial"),
-            ("wrist", "wrist_radius", "wrist_ulna"),
-        ):
-            moved[:, INDEX[f"{side}_{joint}"]] = (at[f"{side}_{one}"] + at[f"{side}_{other}"]) / 2
+        for joint, one, other in MIDWAY:
+            share = KNUCKLE if joint == "hand" else 0.5
+            start, end = at[f"{side}_{one}"], at[f"{side}_{other}"]
+            moved[:, INDEX[f"{side}_{joint}"]] = start + share * (end - start)
         offset = np.array([-sign * SHOULDER["inward"], -SHOULDER["down"], SHOULDER["forward"]])
         moved[:, INDEX[f"{side}_shoulder"]] = at[f"{side}_acromion"] + width[:, None] * offset
     moved[:, 0] += (moved[:, [1, 2]] - joints[:, [1, 2]]).mean(axis=1) / 2

@@ -152,6 +152,7 @@ def _foot(body: Mannequin) -> dict[str, Landmark]:
         "{side}_calcaneus": heel("calcaneus"),
         "bp_{side}_heel": heel("heel"),
         "{side}_toe": body.picker.surface(toes[1], UP, foot),
+        "{side}_toe_plantar": body.picker.surface(toes[1], -UP, foot),
         "{side}_meta1": body.picker.surface(toes[0], -LEFT, foot),
         "{side}_meta5": body.picker.surface(toes[4], LEFT, foot),
         "bp_{side}_foot_index": mean(*tips),
@@ -186,7 +187,10 @@ def _hand(body: Mannequin) -> dict[str, Landmark]:
     radial = body.bones["finger2-1.L"] - body.bones["finger5-1.L"]
     dorsal = _unit(np.cross(radial, third - wrist))
     palm = body.part("left_wrist", "left_hand")
-    found = {"{side}_hand_meta3": body.picker.surface(third, dorsal, palm)}
+    found = {
+        "{side}_hand_meta3": body.picker.surface(third, dorsal, palm),
+        "{side}_hand_meta3_palmar": body.picker.surface(third, -dorsal, palm),
+    }
     for name, bone in (("index", "finger2-1.L"), ("pinky", "finger5-1.L"), ("thumb", "finger1-2.L")):
         found[f"bp_{{side}}_{name}"] = body.picker.around(body.bones[bone], skin)
     return found

@@ -8,6 +8,8 @@ from resources.bake_body.coarse import vertex_areas
 from resources.bake_body.source import Sample
 from solver.body.skeleton import INDEX
 
+KNUCKLE = 0.55
+"""Weight of the finger bones beyond which skin is past the knuckles."""
 HEAD_GAP, FOOT_GAP = 0.030, 0.015
 """m of free space that a marker needs outwards: keeps nostrils, ears' folds and clefts between toes out."""
 
@@ -16,7 +18,7 @@ def marker_mask(
     vertices: np.ndarray, faces: np.ndarray, weights: np.ndarray, inner: np.ndarray, fingers: np.ndarray
 ) -> np.ndarray:
     """(V,) bool on the T-pose template; ``fingers`` (V,) is the weight of bones beyond the knuckles."""
-    allowed = ~inner & (fingers < 0.3) & (vertex_areas(vertices, faces) > 0)
+    allowed = ~inner & (fingers < KNUCKLE) & (vertex_areas(vertices, faces) > 0)
     normal = vertex_normals(vertices, faces)
     dominant = weights.argmax(axis=1)
     foot = np.isin(dominant, [INDEX[f"{side}_{joint}"] for side in ("left", "right") for joint in ("ankle", "foot")])

@@ -49,13 +49,13 @@ class Picker:
         a, b, c = (self.vertices[faces[:, i]] for i in range(3))
         normal = np.cross(direction, c - a)
         determinant = np.einsum("fd,fd->f", b - a, normal)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        other = np.cross(origin - a, b - a)
+        tolerance = 1e-9
+        with np.errstate(divide="ignore", invalid="ignore"):  # faces along the ray
             u = np.einsum("fd,fd->f", origin - a, normal) / determinant
-            other = np.cross(origin - a, b - a)
             v = other @ np.asarray(direction, dtype=float) / determinant
             distance = np.einsum("fd,fd->f", c - a, other) / determinant
-        tolerance = 1e-9
-        hit = (u >= -tolerance) & (v >= -tolerance) & (u + v <= 1 + tolerance) & (distance > 0)
+            hit = (u >= -tolerance) & (v >= -tolerance) & (u + v <= 1 + tolerance) & (distance > 0)
         if not hit.any():
             raise ValueError(f"no surface from {np.round(origin, 3)} along {np.round(direction, 2)}")
         f = np.flatnonzero(hit)[np.argmax(distance[hit])]

@@ -7,7 +7,7 @@ import numpy as np
 from resources.bake_body.shape_space import ShapeSpace
 from solver.body.skeleton import INDEX
 
-MOVED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+MOVED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot", "hand")
 """Joints whose centres are anatomical, not the rig's."""
 
 

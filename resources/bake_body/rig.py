@@ -11,6 +11,7 @@ from resources.bake_body.source import Sample
 from solver.body.skeleton import JOINTS
 
 WEIGHTS = 4
+SMOOTHINGS = 4
 
 _SIDED = {
     "hip": "upperleg01",
@@ -66,10 +67,20 @@ def merge_weights(sample: Sample) -> np.ndarray:
 
 
 def top_weights(dense: np.ndarray) -> np.ndarray:
-    """(V, 24) the four largest weights of each row, renormalised."""
-    kept = dense.copy()
-    np.put_along_axis(kept, np.argsort(-dense, axis=1, kind="stable")[:, WEIGHTS:], 0.0, axis=1)
+    """(V, 24) the four largest weights of each row, renormalised; of two sides' equal fourths neither is kept."""
+    fifth = -np.sort(-dense, axis=1)[:, WEIGHTS : WEIGHTS + 1]
+    kept = np.where(dense > fifth + 1e-9, dense, 0.0)
     return kept / kept.sum(axis=1, keepdims=True)
+
+
+def smooth_weights(weights: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(V, 24) weights averaged with their neighbours', since the rig's jump from ankle to toe and at the elbow."""
+    edges = np.unique(faces[:, [0, 1, 1, 2, 2, 0, 1, 0, 2, 1, 0, 2]].reshape(-1, 2), axis=0)
+    near = sp.coo_matrix((np.ones(len(edges)), edges.T), shape=(len(weights),) * 2).tocsr()
+    share = sp.diags(1 / np.asarray(near.sum(axis=1)).ravel()) @ near
+    for _ in range(SMOOTHINGS):
+        weights = (weights + share @ weights) / 2
+    return weights
 
 
 def main_component(faces: np.ndarray, count: int) -> np.ndarray:
