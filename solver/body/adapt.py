@@ -58,13 +58,10 @@ def _named_like(own: Body, known: Body) -> Body:
     spacing, vertices = to_own.query(points, k=min(3, len(own.template)))
     share = 1 / np.maximum(spacing, 1e-4)
     coarse = np.unique(to_own.query(carried[known.lod_index])[1])
-    inside = np.isin(own.faces, coarse).all(axis=1)
-    position = np.full(len(own.template), -1)
-    position[coarse] = np.arange(len(coarse))
     return replace(
         own,
         lod_index=coarse,
-        lod_faces=position[own.faces[inside]],
+        lod_faces=_coarse_faces(own.template, own.faces, coarse),
         marker_mask=known.marker_mask[to_known],
         landmark_names=known.landmark_names,
         landmark_vertices=vertices.reshape(len(points), -1),
@@ -72,6 +69,27 @@ def _named_like(own: Body, known: Body) -> Body:
         landmark_joint=known.landmark_joint,
         _torch={},
     )
+
+
+def _coarse_faces(vertices: np.ndarray, faces: np.ndarray, seeds: np.ndarray) -> np.ndarray:
+    """(Lf, 3) triangles between seeds (L,): a face whose corners are nearest to three of them joins these three.
+
+    Nearness is measured along the surface, so that neighbouring fingers do not grow together.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import dijkstra
+
+    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+    graph = coo_matrix((np.maximum(length, 1e-9), edges.T), shape=(len(vertices),) * 2).tocsr()
+    nearest = dijkstra(graph, directed=False, indices=seeds, min_only=True, return_predecessors=True)[2]
+    position = np.full(len(vertices) + 1, -1)  # what no seed reaches has a negative source: the last place
+    position[seeds] = np.arange(len(seeds))
+    corners = position[np.where(nearest < 0, -1, nearest)][faces]
+    a, b, c = corners.T
+    corners = corners[(a != b) & (b != c) & (c != a) & (corners >= 0).all(axis=1)]
+    first = np.argmin(corners, axis=1)[:, None]
+    return np.unique(np.take_along_axis(corners, (first + np.arange(3)) % 3, axis=1), axis=0)
 
 
 def _carried(known: Body, joints: np.ndarray) -> np.ndarray:
