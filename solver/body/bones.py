@@ -16,7 +16,7 @@ from solver.body.skeleton import INDEX, descendants
 
 @dataclass(frozen=True)
 class BoneMode:
-    """One way bones may differ from the learnt shapes: the bones (joint, child) that stretch, and how much a unit is."""
+    """One way bones may differ from the learnt shapes: which bones (joint, child) stretch, and how much a unit is."""
 
     name: str
     bones: tuple[tuple[str, str], ...]
