@@ -27,7 +27,7 @@ def group_markers(given: Mapping[str, Any], settings: SegmentSettings, progress:
     return segment(given["markers"], settings, progress)
 
 
-def _scene(given: Mapping[str, Any]) -> tuple[Body, Observations, Points]:
+def scene(given: Mapping[str, Any]) -> tuple[Body, Observations, Points]:
     """The body with free bone lengths, what was observed on the markers' clock, and the landmarks' body points."""
     from solver.solve.observe import observe
 
@@ -47,7 +47,7 @@ def place_markers(given: Mapping[str, Any], settings: LocalizeSettings, progress
     """Hypotheses of where on the body the markers sit."""
     from solver.solve.method import localize
 
-    body, seen, _ = _scene(given)
+    body, seen, _ = scene(given)
     left_out = given["segment"].clusters < 0
     return localize(body, seen, left_out, settings, _camera(given["camera_file"], seen.image_size))
 
@@ -56,7 +56,7 @@ def rank_placements(given: Mapping[str, Any], settings: OrientSettings, progress
     """The hypotheses fitted and ranked."""
     from solver.solve.method import orient
 
-    body, seen, points = _scene(given)
+    body, seen, points = scene(given)
     camera = _camera(given["camera_file"], seen.image_size)
     return orient(body, seen, points, given["localize"], settings, camera, progress)
 
@@ -65,7 +65,7 @@ def fit_every_frame(given: Mapping[str, Any], settings: FitSettings, progress: P
     """The chosen answer carried to every frame."""
     from solver.solve.method import fit
 
-    body, seen, points = _scene(given)
+    body, seen, points = scene(given)
     time = given["markers"].time
     return fit(body, seen, points, given["localize"], given["orient"], time, settings, progress)
 

@@ -38,7 +38,8 @@ def _said_sync(sync: Sync) -> str:
     return f"marker time = video time {sync.offset:+.3f} s{ratio} ({sync.method}, confidence {sync.confidence:.2f})"
 
 
-def _said_segmentation(found: Segmentation) -> str:
+def said_segmentation(found: Segmentation) -> str:
+    """How many groups."""
     return f"{found.count} groups of markers that move together"
 
 
@@ -46,7 +47,8 @@ def _said_localization(found: Localization) -> str:
     return f"{len(found.start)} ways to put the markers on the body"
 
 
-def _said_orientation(ranked: Orientation) -> str:
+def said_orientation(ranked: Orientation) -> str:
+    """The best answer, and how far the next is behind."""
     best = ranked.candidates[0]
     margin = (
         "no other answer" if ranked.runner_up < 0 else f"next different answer costs {ranked.margin:.2f} times as much"
@@ -54,7 +56,8 @@ def _said_orientation(ranked: Orientation) -> str:
     return f"{best.part}; {margin}; confidence {ranked.confidence:.2f}"
 
 
-def _said_fit(motion: FittedMotion) -> str:
+def said_fit(motion: FittedMotion) -> str:
+    """How near the markers are."""
     residual = 1000 * np.nanmedian(motion.residual)
     return f"{len(motion.time)} frames, markers {residual:.1f} mm from their places (median)"
 
@@ -67,7 +70,7 @@ def _said_angles(angles: JointAngles) -> str:
     return f"{len(angles.names)} angles ({angles.title})"
 
 
-_FITTED_TO = ("markers", "prior", "landmarks", "sync", "body_file")
+FITTED_TO = ("markers", "prior", "landmarks", "sync", "body_file")
 """What every stage of the fit looks at."""
 
 GRAPH = (
@@ -85,13 +88,13 @@ GRAPH = (
     Stage("prior", 1, PriorSettings, ("prior_file", "landmarks"), inputs.pose_prior, PosePrior, cost=2),
     Stage("sync", 1, SyncSettings, ("markers", "landmarks", "prior"), inputs.synchronise, Sync, _said_sync, cost=1),
     Stage(
-        "segment", 1, SegmentSettings, ("markers",), fitting.group_markers, Segmentation, _said_segmentation, cost=0.3
+        "segment", 1, SegmentSettings, ("markers",), fitting.group_markers, Segmentation, said_segmentation, cost=0.3
     ),
     Stage(
         "localize",
         1,
         LocalizeSettings,
-        (*_FITTED_TO, "segment", "camera_file"),
+        (*FITTED_TO, "segment", "camera_file"),
         fitting.place_markers,
         Localization,
         _said_localization,
@@ -101,20 +104,20 @@ GRAPH = (
         "orient",
         1,
         OrientSettings,
-        (*_FITTED_TO, "localize", "camera_file"),
+        (*FITTED_TO, "localize", "camera_file"),
         fitting.rank_placements,
         Orientation,
-        _said_orientation,
+        said_orientation,
         cost=5,
     ),
     Stage(
         "fit",
         1,
         FitSettings,
-        (*_FITTED_TO, "localize", "orient"),
+        (*FITTED_TO, "localize", "orient"),
         fitting.fit_every_frame,
         FittedMotion,
-        _said_fit,
+        said_fit,
         cost=2,
     ),
     Stage("angles", 2, AngleSettings, ("fit", "body_file"), fitting.read_angles, JointAngles, _said_angles, cost=0.1),
