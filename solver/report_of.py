@@ -12,6 +12,7 @@ import numpy as np
 from solver.angles import JointAngles
 from solver.body.skeleton import BONES, JOINTS
 from solver.markers import Markers
+from solver.pipeline.doubts import doubts
 from solver.pipeline.session import Session
 from solver.pipeline.stage import GraphRun
 from solver.report import write_report
@@ -51,7 +52,7 @@ def report_of(path: Path, session: Session, graph: GraphRun, named: Markers, abo
 
 
 def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str, Any]) -> ReportData:
-    markers, motion, ranked, sync = graph["markers"], graph["fit"], graph["orient"], graph["sync"]
+    markers, motion, ranked = graph["markers"], graph["fit"], graph["orient"]
     notes = {"marker_file": markers.notes, "prior_file": graph["prior"].notes}
     inputs = tuple(
         InputFile(_ROLES.get(name, name), row["file"], row["sha256"], tuple(notes.get(name, ())))
@@ -72,7 +73,7 @@ def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str,
         title=marker_file.stem,
         subtitle=f"{ranked.candidates[motion.chosen].part}, {len(motion.time)} frames at {markers.rate:g} Hz",
         headlines=_headlines(graph, motion, ranked),
-        warnings=(*sync.notes, *motion.warnings),
+        warnings=doubts(graph),
         inputs=inputs,
         groups=_groups(markers, graph["segment"]),
         hypotheses=_hypotheses(ranked, motion),

@@ -129,8 +129,8 @@ def session(out: Path, recording: Recording, settings: Mapping[str, Any] = QUICK
     return SolveRequest(out)
 
 
-def know(made: Session, recording: Recording) -> None:
-    """Put the landmarks into a session's store, as if the network had looked at its video."""
+def know(made: Session, recording: Recording, seen: Landmarks | None = None) -> None:
+    """Put landmarks into a session's store, as if the network had looked at its video."""
     sources = {name: Source.file(None) for name in SOURCES} | {"video_file": Source.file(recording.video)}
     key = stage_keys(GRAPH, sources, {"landmarks": LandmarkSettings()})["landmarks"]
-    made.store.put("landmarks", key, watched(recording), {"seconds": 0.0, "headline": "simulated"})
+    made.store.put("landmarks", key, seen or watched(recording), {"seconds": 0.0, "headline": "simulated"})

@@ -14,12 +14,15 @@ import numpy as np
 
 from solver.errors import InputError
 from solver.io.camera import camera_file
+from solver.outputs import FILES, SOMETIMES, write_outputs
+from solver.pipeline.doubts import assumptions, doubts
+from solver.pipeline.methods import GRAPHS, graph_of, with_method
 from solver.pipeline.output import remove_if_empty
-from solver.pipeline.request import SolveOutcome, SolveRequest
-from solver.pipeline.session import InputFile, Session, load_session, save_session, session_folder
+from solver.pipeline.request import Method, SolveOutcome, SolveRequest
+from solver.pipeline.session import InputFile, RunSettings, Session, load_session, save_session, session_folder
 from solver.pipeline.settings import UNSET, overlay
-from solver.pipeline.stage import GraphRun, OnEvent, ignore, run_graph
-from solver.pipeline.stages import GRAPH, SOURCES
+from solver.pipeline.stage import GraphRun, OnEvent, Source, ignore, run_graph, stage_keys
+from solver.pipeline.stages import SOURCES
 from solver.progress import Progress, part_of, silent
 from solver.solve.results import Candidate
 
@@ -45,14 +48,15 @@ def solve_session(request: SolveRequest, progress: Progress = silent, on_event: 
             "there is neither a video nor a pose prior", request.markers, "give one with --video or --prior"
         )
     with _tidy(session):
-        sources, settings = session.sources(SOURCES), session.stage_settings(GRAPH)
+        stages = graph_of(session)
+        sources, settings = session.sources(SOURCES), session.stage_settings(stages)
         session = _spelt_out(session, {name: source.digest for name, source in sources.items()})
+        if not session.store.has("landmarks", stage_keys(stages, sources, settings)["landmarks"]):
+            _look_at_small_inputs(sources)
         graph = run_graph(
-            GRAPH, sources, settings, session.store, progress=part_of(progress, 0.0, 0.97), on_event=on_event or ignore
+            stages, sources, settings, session.store, progress=part_of(progress, 0.0, 0.97), on_event=on_event or ignore
         )
         progress(0.97, "writing results")
-        from solver.outputs import write_outputs
-
         write_outputs(session, graph)
         _save(session)
     progress(1.0, "done")
@@ -91,12 +95,14 @@ def _again(out: Path, request: SolveRequest) -> Session:
 
     Where this folder has been solved into before, what the user decided by hand on the same marker file is kept.
     """
+    method: Method = request.method or RunSettings().method
+    run = RunSettings(method=method)
     if session_folder(out) is None:
-        return Session(out)
-    before = load_session(out)
+        return Session(out, run=run)
+    before = with_method(load_session(out), method)
     known = before.inputs.get("marker_file")
     same = known is not None and known.path == Path(os.path.abspath(request.markers))
-    return Session(out, edits=before.edits if same else {})
+    return Session(out, edits=before.edits if same else {}, run=run)
 
 
 def _with_input(session: Session, name: str, path: Path) -> Session:
@@ -104,21 +110,24 @@ def _with_input(session: Session, name: str, path: Path) -> Session:
         raise InputError(f"there is no such {name.removesuffix('_file')} file", path, "check the name and the folder")
     if path.is_dir():
         raise InputError(f"is a folder, not a {name.removesuffix('_file')} file", path, "name the file in it")
-    return replace(session, inputs={**session.inputs, name: InputFile(Path(os.path.abspath(path)))})
+    path = Path(os.path.abspath(path))
+    if path.parent == session.folder and path.name in (*FILES, *SOMETIMES):
+        raise InputError("would be overwritten by the results", path, "choose another folder for them")
+    return replace(session, inputs={**session.inputs, name: InputFile(path)})
 
 
 def _with_options(session: Session, request: SolveRequest) -> Session:
     """The request's options over the session's settings, and over its edits: what is said last counts."""
+    session = with_method(session, request.method or session.run.method)
     settings, edits = dict(session.settings), dict(session.edits)
-    for stage, said in _said(request).items():
+    for stage, said in {**_said(request), **_capped(request, session.run.method)}.items():
         settings[stage] = overlay(settings.get(stage, {}), said)
         edits[stage] = _without(edits.get(stage, {}), {*said, *said.get(UNSET, ())})
-    run = {name: getattr(request, name) for name in ("method", "seed") if getattr(request, name) is not None}
     return replace(
         session,
         settings=settings,
         edits={stage: table for stage, table in edits.items() if table},
-        run=replace(session.run, **run),
+        run=session.run if request.seed is None else replace(session.run, seed=request.seed),
     )
 
 
@@ -144,6 +153,16 @@ def _said(request: SolveRequest) -> dict[str, dict[str, Any]]:
     return {stage: table for stage, table in said.items() if table}
 
 
+def _capped(request: SolveRequest, method: Method) -> dict[str, dict[str, Any]]:
+    """The cap on iterations, for every stage that has one."""
+    if request.iterations is None:
+        return {}
+    capped = [stage.name for stage in GRAPHS[method] if hasattr(stage.settings, "iterations")]
+    if not capped:
+        raise InputError(f"method {method} has no such cap", "--iterations", "leave it out, or use --method paper")
+    return {name: {"iterations": request.iterations} for name in capped}
+
+
 def _without(table: Mapping[str, Any], names: set[str]) -> dict[str, Any]:
     """A table of edits that no longer says anything of these settings."""
     kept = {name: value for name, value in table.items() if name not in (UNSET, *names)}
@@ -154,7 +173,7 @@ def _without(table: Mapping[str, Any], names: set[str]) -> dict[str, Any]:
 def _spelt_out(session: Session, digests: Mapping[str, str]) -> Session:
     """The session with every setting and what its inputs hold; edits stay apart, so that they can be taken back."""
     inputs = {name: replace(file, digest=digests[name]) for name, file in session.inputs.items()}
-    plain = replace(session, inputs=inputs, edits={}).stage_settings(GRAPH)
+    plain = replace(session, inputs=inputs, edits={}).stage_settings(graph_of(session))
     return replace(session, inputs=inputs).with_settings(plain)
 
 
@@ -178,6 +197,17 @@ def _tidy(session: Session) -> Iterator[None]:
             if new_folder:
                 remove_if_empty(session.folder)
         raise
+
+
+def _look_at_small_inputs(sources: Mapping[str, Source]) -> None:
+    """Refuse what cannot be used before the video is watched, which takes long."""
+    from solver.body.model import Body
+    from solver.io.camera import read_camera
+    from solver.io.priors import load_prior
+
+    for name, read in (("camera_file", read_camera), ("body_file", Body.load), ("prior_file", load_prior)):
+        if sources[name].value is not None:
+            read(sources[name].value)
 
 
 def _outcome(session: Session, graph: GraphRun) -> SolveOutcome:
@@ -204,8 +234,10 @@ def _outcome(session: Session, graph: GraphRun) -> SolveOutcome:
     }
     lines = [f"{name}: {event.text}." for name, event in graph.events.items() if event.text]
     lines.append(f"Results are in {session.folder}.")
-    warnings = (*markers.notes, *graph["prior"].notes, *sync.notes, *motion.warnings)
-    return SolveOutcome(summary=summary, lines=tuple(lines), warnings=warnings, out=session.folder)
+    warnings = (*assumptions(graph), *doubts(graph))
+    return SolveOutcome(
+        summary={**summary, "warnings": warnings}, lines=tuple(lines), warnings=warnings, out=session.folder
+    )
 
 
 def _brief(candidate: Candidate) -> dict[str, Any]:
