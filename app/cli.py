@@ -110,7 +110,8 @@ def _solve_options(solve: argparse.ArgumentParser) -> None:
     timing.add_argument("--rate-ratio", type=float, metavar="R", help="see --offset; 1 where both clocks are right")
 
     how = solve.add_argument_group("solving")
-    how.add_argument("--method", choices=get_args(Method), help="how the body is fitted (default: bundle)")
+    how.add_argument("--method", choices=get_args(Method), help="bundle (default), or paper: Milef et al. (2024)")
+    how.add_argument("--iterations", type=int, metavar="N", help="of each optimisation at most (method paper)")
     how.add_argument("--convention", choices=get_args(Convention), help="names and signs of the angles")
     how.add_argument("--seed", type=int, metavar="N", help="of every random choice (default: 0)")
 

@@ -25,9 +25,9 @@ from solver.io.camera import write_camera
 from solver.io.export_smpl import write_smpl_npz
 from solver.markers import Markers
 from solver.pipeline.digest import canonical, file_digest
+from solver.pipeline.methods import graph_of
 from solver.pipeline.session import Session
 from solver.pipeline.stage import GraphRun
-from solver.pipeline.stages import GRAPH
 from solver.rotations import log_so3
 from solver.solve.results import FittedMotion
 
@@ -174,7 +174,8 @@ def labelled(markers: Markers, motion: FittedMotion) -> Markers:
 
 def provenance(session: Session, graph: GraphRun) -> dict[str, Any]:
     """What was computed from what: program, inputs with digests, every stage's settings and key."""
-    settings = session.stage_settings(GRAPH)
+    stages = graph_of(session)
+    settings = session.stage_settings(stages)
     inputs: Mapping[str, Any] = {
         name: {"file": file.path.name, "sha256": file.digest} for name, file in session.inputs.items()
     }
@@ -188,7 +189,7 @@ def provenance(session: Session, graph: GraphRun) -> dict[str, Any]:
                 "version": stage.version,
                 "settings": canonical(settings[stage.name]),
             }
-            for stage in GRAPH
+            for stage in stages
         },
         "edits": canonical(session.edits),
     }

@@ -13,7 +13,7 @@ from solver.errors import InputError
 
 Up = Literal["x", "y", "z"]
 Units = Literal["m", "cm", "mm"]
-Method = Literal["bundle"]
+Method = Literal["bundle", "paper"]
 Convention = Literal["opensim", "isb", "gait2392", "visual3d", "plugin-gait"]
 
 
@@ -35,6 +35,7 @@ class SolveRequest:
     marker_rate : Hz, frame rate of the marker file where it does not say
     range : (start, stop) s in the marker file's clock, either may be None
     method : how the body is fitted
+    iterations : of each optimisation at most, for the paper's method
     seed : of every random choice
     body : a user's own SMPL-layout model instead of the embedded body
     convention : names and signs of the angles
@@ -53,6 +54,7 @@ class SolveRequest:
     marker_rate: float | None = None
     range: tuple[float | None, float | None] | None = None
     method: Method | None = None
+    iterations: int | None = None
     seed: int | None = None
     body: Path | None = None
     convention: Convention | None = None
@@ -71,6 +73,8 @@ class SolveRequest:
             value = getattr(self, name)
             if value is not None and value <= 0:
                 raise InputError(f"{value:g} is not possible", option(name), "give a number above 0")
+        if self.iterations is not None and self.iterations < 1:
+            raise InputError(f"{self.iterations} is not possible", option("iterations"), "give 1 or more")
         if self.seed is not None and self.seed < 0:
             raise InputError(f"{self.seed} is not possible", option("seed"), "give 0 or a positive whole number")
         if self.range is not None:

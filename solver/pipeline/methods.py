@@ -1,0 +1,39 @@
+"""The methods that a body can be fitted by: the graph of each, and a session taken from one to another."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from solver.pipeline.request import Method
+from solver.pipeline.session import Session
+from solver.pipeline.stage import Stage
+from solver.pipeline.stages import GRAPH
+from solver.pipeline.stages_paper import GRAPH_PAPER
+
+GRAPHS: dict[Method, tuple[Stage, ...]] = {"bundle": GRAPH, "paper": GRAPH_PAPER}
+
+
+def graph_of(session: Session) -> tuple[Stage, ...]:
+    """The stages of the session's method."""
+    return GRAPHS[session.run.method]
+
+
+def with_method(session: Session, method: Method) -> Session:
+    """The session to be solved by another method.
+
+    What belongs to the old method alone goes: the settings of stages that both do differently, and the decisions
+    among the old one's answers. Decisions on the grouping of markers stay.
+    """
+    if method == session.run.method:
+        return session
+    old, new = ({stage.name: stage.settings for stage in GRAPHS[m]} for m in (session.run.method, method))
+    same = {name for name in old if new.get(name) is old[name]}
+    akin = {
+        name for name, own in old.items() if name in new and (issubclass(new[name], own) or issubclass(own, new[name]))
+    }
+    return replace(
+        session,
+        settings={name: table for name, table in session.settings.items() if name in same or name not in old},
+        edits={name: table for name, table in session.edits.items() if name in akin or name not in old},
+        run=replace(session.run, method=method),
+    )

@@ -1,0 +1,126 @@
+"""The published method's answer as a motion of every frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.body.model import Body
+from solver.errors import InputError
+from solver.progress import Progress, silent
+from solver.rotations import kabsch, slerp
+from solver.solve.bundle import locate_camera
+from solver.solve.kinematics import Points, Pose, forward, place_points
+from solver.solve.paper.results import BodyState, PaperLocalization, PaperSolve
+from solver.solve.paper.sequence import sequence_of
+from solver.solve.paper.settings import PaperFitSettings
+from solver.solve.paper.solve import refine
+from solver.solve.placement import Skin
+from solver.solve.problem import Problem
+from solver.solve.results import CameraResult, FittedMotion, Orientation
+from solver.solve.state import Observations, State, Weights
+
+
+def motion_of(
+    body: Body,
+    seen: Observations,
+    time: np.ndarray,
+    found: PaperLocalization,
+    solved: PaperSolve,
+    ranked: Orientation,
+    settings: PaperFitSettings | None = None,
+    progress: Progress = silent,
+) -> FittedMotion:
+    """The best yaw, or the one pinned, carried from the frames in use to all T.
+
+    Parameters
+    ----------
+    seen, time : all T frames, s
+    ranked : of the same solve
+    """
+    pinned = None if settings is None else settings.candidate
+    row = 0 if pinned is None else pinned
+    yaws = len(solved.yaws)
+    if not 0 <= row < yaws:
+        raise InputError(f"is {row}", "the pinned candidate", f"pin one of the {yaws} yaws, counted from 0")
+    chosen = ranked.candidates[row]
+    vertex, state = solved.vertex, solved.refined.body
+    if chosen.hypothesis != solved.chosen:
+        sequence = sequence_of(body, seen, found.frames, found.markers, len(state.betas))
+        vertex, stage = refine(sequence, solved.yaws[chosen.hypothesis], solved.settings, progress)
+        state = stage.body
+    at = time[found.frames]
+    rotations = slerp(state.rotations, at, time)
+    trans = np.stack([np.interp(time, at, state.trans[:, k]) for k in range(3)], axis=1)
+    return fitted_motion(
+        body,
+        seen.markers,
+        time,
+        Pose(rotations, trans, full_shape(body, state.betas)),
+        found.markers,
+        vertex,
+        solved.settings.offset,
+        camera=chosen.camera,
+        chosen=row,
+        confidence=ranked.confidence if pinned is None else 1.0,
+        warnings=ranked.warnings if pinned is None else (f"Candidate {row} was pinned by hand.",),
+    )
+
+
+def fitted_motion(
+    body: Body,
+    markers: np.ndarray,
+    time: np.ndarray,
+    pose: Pose,
+    used: np.ndarray,
+    vertex: np.ndarray,
+    offset: float,
+    *,
+    camera: CameraResult,
+    chosen: int,
+    confidence: float,
+    warnings: tuple[str, ...],
+) -> FittedMotion:
+    """A motion whose markers (T, M, 3) m stand ``offset`` m off the vertices of those that were used (U,)."""
+    count = markers.shape[1]
+    links = forward(body, pose)
+    placement, _ = Skin(body, pose.betas).on_vertices(vertex, offset)
+    placed = np.full((len(time), count, 3), np.nan)
+    placed[:, used] = place_points(placement, links, pose.betas)
+    marker_joint, marker_vertex = np.full(count, -1), np.full(count, -1)
+    marker_joint[used], marker_vertex[used] = body.weights[vertex].argmax(axis=1), vertex
+    return FittedMotion(
+        time=time,
+        rotations=pose.rotations,
+        trans=pose.trans,
+        betas=pose.betas,
+        joints=links.place,
+        marker_joint=marker_joint,
+        marker_vertex=marker_vertex,
+        placed=placed,
+        residual=np.linalg.norm(markers - placed, axis=2),
+        camera=camera,
+        chosen=chosen,
+        confidence=confidence,
+        warnings=warnings,
+    )
+
+
+def full_shape(body: Body, betas: np.ndarray) -> np.ndarray:
+    """All shape coefficients of the body, those that were not free zero."""
+    return np.concatenate([betas, np.zeros(body.shape_count - len(betas))])
+
+
+def camera_of(body: Body, used: Observations, landmarks: Points, state: BodyState) -> CameraResult:
+    """A camera that sees the fitted body as the video saw it; the method itself has none.
+
+    Its turn is the mean of those from the video's root to the fitted one; it stands where the landmarks want it.
+    """
+    seen_axes, lab_axes = (r.swapaxes(1, 2).reshape(-1, 3) for r in (used.prior[:, 0], state.rotations[:, 0]))
+    turn = kabsch(seen_axes, lab_axes)
+    problem = Problem(body, used, landmarks)
+    pose = Pose(state.rotations, state.trans, full_shape(body, state.betas))
+    camera = locate_camera(problem, pose, turn, Weights())
+    none = Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
+    position = camera.centre - camera.R_lab_cam @ camera.shift
+    miss = problem.reprojection(State(pose, none, camera))
+    return CameraResult(camera.R_lab_cam, position, camera.focal, used.image_size, miss)
