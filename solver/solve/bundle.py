@@ -242,8 +242,8 @@ def relax(
         pool = spread(partial(_advance, problem, phases=(phase,), base=base, judge=judge), pool[:count]) + pool[count:]
     pool.sort(key=lambda fit: fit.energies.total)
     chosen = _varied(pool, keep)
-    judge = phase_weights(base, FINE[-1])
     whole = Problem(body, seen.at(many), landmarks)
+    judge = _judging(phase_weights(base, FINE[-1]), whole)
     progress(0.6, f"refining {len(chosen)} hypotheses")
 
     def closer_look(fit: Fit) -> Fit:
@@ -256,6 +256,18 @@ def relax(
     fine = spread(partial(_advance, whole, phases=FINE[1:], base=base, judge=judge), fine)
     fine.sort(key=lambda fit: fit.energies.total)
     return tuple(fine) + tuple(fit for fit in pool if not any(fit is one for one in chosen))
+
+
+def _judging(weights: Weights, problem: Problem) -> Weights:
+    """The weights by which answers are compared.
+
+    Where the video's landmarks are there, its pose was lifted from them: it counts half, lest the same errors, those of
+    depth above all, are counted twice.
+    """
+    if not problem.in_image.any():
+        return weights
+    wider = np.sqrt(2)
+    return replace(weights, prior_deg=weights.prior_deg * wider, root_deg=weights.root_deg * wider)
 
 
 def _advance(problem: Problem, fit: Fit, *, phases: tuple[Phase, ...], base: Weights, judge: Weights) -> Fit:
