@@ -37,6 +37,8 @@ BIACROMIAL = 0.2245
 WRIST_BEYOND_RIG = 0.008
 """m on the mean body, from the rig's wrist to the line of the styloids, just past the narrowest forearm; this leaves
 0.11 of stature for the hand."""
+EAR_BELOW_EYE = 0.03
+"""m on the mean body, from the eyes down to the middle of the ears."""
 UP, FRONT, LEFT = np.eye(3)[[1, 2, 0]]
 
 
@@ -207,7 +209,9 @@ def _face(body: Mannequin) -> dict[str, Landmark]:
     lips = rim[(vertices[rim, 1] < eye_height - 0.03) & (vertices[rim, 0] > 0.005)]
     ends = [Landmark((int(eyelid[pick(vertices[eyelid, 0])]),), (1.0,)) for pick in (np.argmin, np.argmax)]
     centre = vertices[eyelid].mean(axis=0)
-    outer = head & (vertices[:, 0] > 0.9 * vertices[head, 0].max())
+    # The ear lies between brow and nose; further down the neck's flare may be as wide.
+    beside = head & (np.abs(vertices[:, 1] - (eye_height - EAR_BELOW_EYE)) < EAR_BELOW_EYE)
+    outer = beside & (vertices[:, 0] > 0.9 * vertices[beside, 0].max())
     ear = vertices[outer]
     tragus = np.array([0.07, ear[:, 1].mean(), ear[:, 2].max()])
     return {

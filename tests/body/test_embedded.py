@@ -198,6 +198,7 @@ def test_landmarks_are_all_there_and_where_their_names_say(body: Body):
     assert all(np.isfinite(point).all() for point in marks.values())
     np.testing.assert_allclose(body.landmark_values.sum(axis=1)[body.landmark_joint < 0], 1, atol=1e-6)
     assert marks["bp_nose"][2] > marks["bp_left_ear"][2] + 0.08
+    assert abs(marks["bp_nose"][1] - marks["bp_left_ear"][1]) < 0.04, "ears are level with the nose"
     assert marks["bp_left_eye_outer"][0] > marks["bp_left_eye"][0] > marks["bp_left_eye_inner"][0] > 0
     assert marks["bp_nose"][1] > marks["bp_mouth_left"][1]
     assert marks["left_meta5"][0] > marks["left_toe"][0] > marks["left_meta1"][0]
