@@ -232,12 +232,14 @@ def _outcome(session: Session, graph: GraphRun) -> SolveOutcome:
         "m2s_mm": 1000 * surface.mean,
         "residual_median_mm": float(1000 * np.nanmedian(motion.residual)),
     }
-    lines = [f"{name}: {event.text}." for name, event in graph.events.items() if event.text]
-    lines.append(f"Results are in {session.folder}.")
-    warnings = (*assumptions(graph), *doubts(graph))
-    return SolveOutcome(
-        summary={**summary, "warnings": warnings}, lines=tuple(lines), warnings=warnings, out=session.folder
+    said, doubted = assumptions(graph), doubts(graph)
+    lines = (
+        *(f"{name}: {event.text}." for name, event in graph.events.items() if event.text),
+        *(f"Note: {note}" for note in said),
+        f"Results are in {session.folder}.",
     )
+    summary |= {"notes": list(said), "warnings": list(doubted)}
+    return SolveOutcome(summary=summary, lines=lines, warnings=doubted, out=session.folder)
 
 
 def _brief(candidate: Candidate) -> dict[str, Any]:
