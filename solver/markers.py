@@ -84,7 +84,8 @@ class Markers:
         frames = np.flatnonzero(inside)
         if not len(frames):
             raise InputError(
-                f"no frame lies in the range asked for; the recording runs from {self.time[0]:g} s to {self.time[-1]:g} s",
+                "no frame lies in the range asked for; the recording runs "
+                f"from {self.time[0]:g} s to {self.time[-1]:g} s",
                 self.source,
                 "choose a range inside it",
             )

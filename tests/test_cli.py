@@ -118,9 +118,7 @@ def test_quiet_prints_the_json_alone(markers: Path, tmp_path: Path, capsys) -> N
 def test_demo_solves_the_embedded_session_and_compares_with_the_truth(tmp_path: Path, capsys) -> None:
     fake = Fake()
     assert main(["demo", "--headless", "--out", str(tmp_path / "out"), "--json"], fake.services) == 0
-    assert fake.solves == [
-        SolveRequest(cli_commands.DEMO_MARKERS, video=cli_commands.DEMO_VIDEO, out=tmp_path / "out")
-    ]
+    assert fake.solves == [SolveRequest(cli_commands.DEMO_MARKERS, video=cli_commands.DEMO_VIDEO, out=tmp_path / "out")]
     assert fake.demos == [tmp_path / "out"]
     printed = capsys.readouterr().out
     assert "Against the known truth:\nMPJPE 12.0 mm." in printed
