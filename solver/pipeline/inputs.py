@@ -180,7 +180,7 @@ def synchronise(given: Mapping[str, Any], settings: SyncSettings, progress: Prog
         return found
     note = (
         f"The video shows the person for only {100 * in_sight:.0f} % of the markers' time; "
-        "the rest rests on the markers alone."
+        "beyond it, the pose rests on the markers alone."
     )
     return replace(found, notes=(*found.notes, note))
 
