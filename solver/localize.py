@@ -48,9 +48,9 @@ class Search:
     Attributes
     ----------
     yaws : starts of the camera's heading, evenly spread
-    tilts : also start from turned lab frames, where the vertical axis is not to be trusted
     rounds : of assignment and registration
     keep : hypotheses handed on
+    any_orientation : also start from turned lab frames, where the vertical axis is not to be trusted
     """
 
     yaws: int = 12

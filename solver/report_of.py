@@ -37,7 +37,7 @@ _ROLES = {
     "camera_file": "camera",
     "body_file": "body",
 }
-_LIBRARIES = ("numpy", "scipy", "open3d-cpu", "open3d", "ai-edge-litert", "av", "ezc3d")
+_LIBRARIES = ("numpy", "scipy", "open3d-cpu", "open3d", "ai-edge-litert", "av")
 
 
 def report_of(path: Path, session: Session, graph: GraphRun, named: Markers, about: Mapping[str, Any]) -> None:

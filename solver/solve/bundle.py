@@ -23,9 +23,6 @@ from solver.solve.problem import Problem
 from solver.solve.refine import carried_over
 from solver.solve.state import Camera, Energies, Observations, State, Surface, Weights
 
-NOWHERE = Points(np.zeros((0, 3)), np.zeros((0, 3, 0)), np.zeros((0, 24)))
-
-
 _SAME_ENERGY = 1.03
 _SAME_TURN = np.radians(3.0)
 _ENOUGH = 3e-4

@@ -208,7 +208,6 @@ class Problem:
         free = np.zeros(self.placement_at.stop, dtype=bool)
         free[self.shape_at] = weights.free_shape
         free[self.camera_at] = weights.free_camera
-        free[self.camera_at.stop - 1] &= weights.free_focal
         if not self.in_image.any():
             free[self.camera_at.start + 3 : self.camera_at.stop] = False
         free[self.placement_at] = weights.free_placement

@@ -64,10 +64,6 @@ class Camera:
     centre: np.ndarray
     focal: float
 
-    def moved_to(self, centre: np.ndarray) -> Camera:
-        """The same camera written about another lab point."""
-        return replace(self, shift=self.shift + (centre - self.centre) @ self.R_lab_cam, centre=centre)
-
     def to_camera(self, points: np.ndarray) -> np.ndarray:
         """(..., 3) m, lab to camera frame."""
         return (points - self.centre) @ self.R_lab_cam + self.shift
@@ -104,7 +100,7 @@ class Weights:
         marker's own 2 mm and what the shapes miss of a real skin
     slide : m, how far a marker may slide over the skin in one step
     focal_spread : natural logarithm of the focal length
-    free_focal, free_camera : False holds the camera's focal length, or all of it
+    free_camera, free_shape, free_placement : False holds the camera, the shape, or where markers sit
     """
 
     marker: float = 0.01
@@ -120,7 +116,6 @@ class Weights:
     slide: float = 0.02
     focal_guess: float = 0.85
     focal_spread: float = 0.25
-    free_focal: bool = True
     free_camera: bool = True
     free_shape: bool = True
     free_placement: bool = True

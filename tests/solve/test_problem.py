@@ -79,4 +79,4 @@ def test_camera_projects_as_a_pinhole() -> None:
     point = np.array([1.3, 2.2, 2.9])
     local = turn.T @ (point - [1, 2, 3]) + [0.1, 0.2, 3.0]
     assert np.allclose(camera.project(point[None], (640, 480))[0], 800 * local[:2] / local[2] + [320, 240])
-    assert np.allclose(camera.moved_to(np.zeros(3)).to_camera(point), local)
+    assert np.allclose(camera.to_camera(point), local)
