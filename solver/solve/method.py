@@ -20,6 +20,17 @@ from solver.solve.refine import every_frame
 from solver.solve.results import CameraResult, Candidate, FittedMotion, Localization, Orientation
 from solver.solve.state import Camera, Observations, State, Surface, Weights
 
+_REACH_M = 2.0
+"""No marker on a person is usually further from the middle of all markers."""
+
+
+def _positive(settings: object, *names: str) -> None:
+    """Refuse settings that cannot work."""
+    for name in names:
+        value = getattr(settings, name)
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"{value} is not possible", f"the setting {name}", "give a number above 0")
+
 
 @dataclass(frozen=True)
 class LocalizeSettings:
@@ -41,6 +52,10 @@ class LocalizeSettings:
     seen_share: float = 0.05
     any_orientation: bool = False
 
+    def __post_init__(self) -> None:
+        """Refuse what cannot work."""
+        _positive(self, "yaws", "few", "many", "keep")
+
 
 @dataclass(frozen=True)
 class OrientSettings:
@@ -59,6 +74,10 @@ class OrientSettings:
     offset_spread_mm: float = 6.0
     prior_deg: float = 18.0
     focal_guess: float = 0.85
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot work."""
+        _positive(self, "refine", "offset_spread_mm", "prior_deg", "focal_guess")
 
     def weights(self) -> Weights:
         """The same as weights of the fit."""
@@ -84,9 +103,13 @@ class FitSettings:
     candidate: int | None = None
     video_share: float = 0.25
 
+    def __post_init__(self) -> None:
+        """Refuse what cannot work."""
+        _positive(self, "video_share")
+
     def weights(self) -> Weights:
         """The same as weights of the fit."""
-        wider = 1 / np.sqrt(max(self.video_share, 1e-6))
+        wider = 1 / np.sqrt(self.video_share)
         base = Weights()
         return replace(base, prior_deg=base.prior_deg * wider, root_deg=base.root_deg * wider, image=base.image * wider)
 
@@ -104,7 +127,8 @@ def localize(
     camera : from another trial of the same session
     """
     present = np.isfinite(seen.markers).all(axis=2)
-    used = np.flatnonzero((present.mean(axis=0) >= settings.seen_share) & (present.sum(axis=0) >= 3) & ~left_out)
+    often = (present.mean(axis=0) >= settings.seen_share) & (present.sum(axis=0) >= 3)
+    used = within_reach(seen.markers, np.flatnonzero(often & ~left_out))
     if len(used) < 3:
         raise InputError(
             f"only {len(used)} markers are seen in enough frames", "the markers", "record or keep at least 3 markers"
@@ -134,6 +158,16 @@ def localize(
         start=tuple(h.start for h in found),
         yaw_deg=np.array([h.yaw_deg for h in found]),
     )
+
+
+def within_reach(markers: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """Those of the ``used`` markers (T, M, 3) m that can sit on one body with most of the others.
+
+    A reflection across the room would otherwise be laid a body over, and the body stretched towards it.
+    """
+    middle = np.nanmedian(markers[:, used], axis=1, keepdims=True)
+    distance = np.nanmedian(np.linalg.norm(markers[:, used] - middle, axis=2), axis=0)
+    return used[distance <= _REACH_M]
 
 
 def keyframes(seen: Observations, used: np.ndarray, count: int) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -69,3 +71,17 @@ def test_a_candidate_that_is_not_there_is_refused(scene: Scene) -> None:
     ranked = orient(scene.body, scene.seen, scene.landmarks, found, OrientSettings(refine=1))
     with pytest.raises(InputError, match="pin one of"):
         fit(scene.body, scene.seen, scene.landmarks, found, ranked, np.arange(60.0), FitSettings(candidate=99))
+
+
+def test_a_reflection_across_the_room_is_left_alone(scene: Scene) -> None:
+    far = np.concatenate([scene.seen.markers, np.full((60, 1, 3), 30.0)], axis=1)
+    seen = replace(scene.seen, markers=far)
+    found = localize(scene.body, seen, np.zeros(37, bool), QUICK)
+    assert 36 not in found.markers
+    assert len(found.markers) == 36
+
+
+@pytest.mark.parametrize("name", ["yaws", "few", "many", "keep"])
+def test_settings_that_cannot_work_are_refused(name: str) -> None:
+    with pytest.raises(InputError, match=name):
+        LocalizeSettings(**{name: 0})
