@@ -53,9 +53,9 @@ class Search:
     any_orientation : also start from turned lab frames, where the vertical axis is not to be trusted
     """
 
-    yaws: int = 12
+    yaws: int = 8
     rounds: int = 12
-    keep: int = 24
+    keep: int = 16
     any_orientation: bool = False
 
 

@@ -45,10 +45,10 @@ class LocalizeSettings:
     any_orientation : also try lab frames that do not stand upright
     """
 
-    yaws: int = 12
+    yaws: int = 8
     few: int = 12
     many: int = 40
-    keep: int = 24
+    keep: int = 16
     seen_share: float = 0.05
     any_orientation: bool = False
 
