@@ -69,6 +69,7 @@ class Fit:
     surface : the skin below each marker
     energies : its cost by kind of evidence, per frame
     trace : total energy after every step
+    refined : True once it was solved on all keyframes
     """
 
     start: Hypothesis
@@ -76,6 +77,7 @@ class Fit:
     surface: Surface
     energies: Energies
     trace: tuple[float, ...]
+    refined: bool = False
 
 
 def start_state(
@@ -246,7 +248,11 @@ def relax(
     def closer_look(fit: Fit) -> Fit:
         pose = carried_over(body, seen, few, fit.state).at(many)
         return _advance(
-            whole, replace(fit, state=replace(fit.state, pose=pose)), phases=FINE[:1], base=base, judge=judge
+            whole,
+            replace(fit, state=replace(fit.state, pose=pose), refined=True),
+            phases=FINE[:1],
+            base=base,
+            judge=judge,
         )
 
     fine = _basins(spread(closer_look, chosen))
@@ -270,7 +276,8 @@ def _judging(weights: Weights, problem: Problem) -> Weights:
 def _advance(problem: Problem, fit: Fit, *, phases: tuple[Phase, ...], base: Weights, judge: Weights) -> Fit:
     """The same fit after some more phases of descent."""
     state, surface, trace = descend(problem, fit.state, fit.surface, phases, base)
-    return Fit(fit.start, state, surface, problem.energies(state, judge, surface), fit.trace + trace)
+    energies = problem.energies(state, judge, surface)
+    return replace(fit, state=state, surface=surface, energies=energies, trace=fit.trace + trace)
 
 
 def _basins(fits: list[Fit]) -> list[Fit]:

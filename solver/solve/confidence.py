@@ -6,7 +6,7 @@ import numpy as np
 
 from solver.body.skeleton import JOINTS, mirror_index
 from solver.rotations import log_so3
-from solver.solve.results import Candidate, Localization, Orientation
+from solver.solve.results import Candidate, Orientation
 from solver.solve.state import Observations
 
 _SAME_BONES = 0.8
@@ -16,25 +16,31 @@ _TIE = 1.15
 _STEEPNESS = 1.75 / np.log(_TIE)
 
 
-def judge(candidates: tuple[Candidate, ...], seen: Observations, found: Localization) -> Orientation:
+def judge(candidates: tuple[Candidate, ...], seen: Observations) -> Orientation:
     """Rank is given; find the best different answer, and say what is ambiguous."""
     best = candidates[0]
     rivals = [i for i, c in enumerate(candidates) if c.refined and i and not same_answer(best, c)]
     runner_up = rivals[0] if rivals else -1
     margin = candidates[runner_up].energy / max(best.energy, 1e-9) if rivals else float("inf")
-    warnings = []
-    moved = movement_deg(seen.prior)
-    if moved < _STILL_DEG:
-        warnings.append(
-            f"The person hardly moves (joints turn by {moved:.0f} degrees in the video), so markers cannot be told "
-            "apart by their motion: check which bones they were given to."
-        )
+    still = stillness(seen)
+    warnings = list(still)
     if rivals and margin < _TIE:
         warnings.append(_tie(best, candidates[runner_up], margin))
     confidence = _sure(margin) if rivals else 0.99
-    if moved < _STILL_DEG:
+    if still:
         confidence = min(confidence, 0.6)
     return Orientation(candidates, float(margin), runner_up, confidence, tuple(warnings))
+
+
+def stillness(seen: Observations) -> tuple[str, ...]:
+    """What to say where the person moves too little for markers to be told apart; nothing otherwise."""
+    moved = movement_deg(seen.prior)
+    if moved >= _STILL_DEG:
+        return ()
+    return (
+        f"The person hardly moves (joints turn by {moved:.0f} degrees in the video), so markers cannot be told "
+        "apart by their motion: check which bones they were given to.",
+    )
 
 
 def _sure(margin: float) -> float:

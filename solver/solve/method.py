@@ -11,7 +11,6 @@ from solver.body.skeleton import JOINTS, PARTS
 from solver.errors import InputError
 from solver.localize import Hypothesis, Search, hypotheses
 from solver.progress import Progress, silent
-from solver.rotations import log_so3
 from solver.solve.bundle import Fit, relax
 from solver.solve.kinematics import Points, Pose, forward, place_points
 from solver.solve.placement import Skin
@@ -165,8 +164,12 @@ def within_reach(markers: np.ndarray, used: np.ndarray) -> np.ndarray:
 
     A reflection across the room would otherwise be laid a body over, and the body stretched towards it.
     """
-    middle = np.nanmedian(markers[:, used], axis=1, keepdims=True)
-    distance = np.nanmedian(np.linalg.norm(markers[:, used] - middle, axis=2), axis=0)
+    cloud = markers[:, used]
+    cloud = cloud[np.isfinite(cloud).all(axis=2).any(axis=1)]
+    if not cloud.size:
+        return used
+    middle = np.nanmedian(cloud, axis=1, keepdims=True)
+    distance = np.nanmedian(np.linalg.norm(cloud - middle, axis=2), axis=0)
     return used[distance <= _REACH_M]
 
 
@@ -224,7 +227,7 @@ def orient(
     index = {id(guess): i for i, guess in enumerate(guesses)}
     whole = Problem(body, used.at(found.many), landmarks)
     candidates = tuple(_candidate(body, fit, index[id(fit.start)], whole) for fit in fits)
-    return judge(candidates, used, found)
+    return judge(candidates, used)
 
 
 def fit(
@@ -283,12 +286,11 @@ def _camera_of(camera: CameraResult, centre: np.ndarray) -> Camera:
 
 def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem) -> Candidate:
     state, camera = fitted.state, fitted.state.camera
-    refined = len(state.pose.trans) == len(whole.target)
     bone = state.placement.weights.argmax(axis=1)
     view = camera.R_lab_cam[:, 2]
     return Candidate(
         hypothesis=hypothesis,
-        refined=refined,
+        refined=fitted.refined,
         energies=asdict(fitted.energies),
         energy=fitted.energies.total,
         bone=bone,
@@ -300,7 +302,7 @@ def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem) -> Cand
             camera.centre - camera.R_lab_cam @ camera.shift,
             camera.focal,
             whole.seen.image_size,
-            whole.reprojection(state) if refined else float("nan"),
+            whole.reprojection(state) if fitted.refined else float("nan"),
         ),
         rest=state.placement.rest,
         dirs=state.placement.dirs,
@@ -322,8 +324,3 @@ def part_name(bone: np.ndarray) -> str:
     counts = {part: sum(JOINTS[b] in names for b in bone) for part, names in PARTS.items()}
     best = max(counts, key=lambda part: counts[part])
     return best.replace("_", " ") if counts[best] >= 0.6 * len(bone) else ", ".join(sorted(carried)).replace("_", " ")
-
-
-def angle_between(first: np.ndarray, second: np.ndarray) -> float:
-    """Degrees between two rotations (3, 3)."""
-    return float(np.degrees(np.linalg.norm(log_so3(first.T @ second))))

@@ -85,3 +85,19 @@ def test_a_reflection_across_the_room_is_left_alone(scene: Scene) -> None:
 def test_settings_that_cannot_work_are_refused(name: str) -> None:
     with pytest.raises(InputError, match=name):
         LocalizeSettings(**{name: 0})
+
+
+def test_in_a_short_recording_only_refined_answers_are_compared(free_body: Body) -> None:
+    scene = simulate(free_body, 8, frames=10)
+    found = localize(scene.body, scene.seen, np.zeros(36, bool), LocalizeSettings(yaws=4, few=10, many=10, keep=8))
+    assert np.array_equal(found.few, found.many)
+    ranked = orient(scene.body, scene.seen, scene.landmarks, found, OrientSettings(refine=2))
+    assert 1 <= sum(candidate.refined for candidate in ranked.candidates) <= 2
+
+
+@pytest.mark.filterwarnings("error")
+def test_frames_without_any_marker_are_passed_over_in_silence(scene: Scene) -> None:
+    markers = scene.seen.markers.copy()
+    markers[20:25] = np.nan
+    found = localize(scene.body, replace(scene.seen, markers=markers), np.zeros(36, bool), QUICK)
+    assert not np.isin(found.many, np.arange(20, 25)).any()

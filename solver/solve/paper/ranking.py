@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.body.model import Body
-from solver.solve.confidence import movement_deg, same_answer
+from solver.solve.confidence import same_answer, stillness
 from solver.solve.kinematics import Points
 from solver.solve.method import part_name
 from solver.solve.paper.motion import camera_of, full_shape
@@ -19,7 +19,6 @@ from solver.solve.state import Observations
 
 _CHAINS_SHOWN = 5
 _MM2 = 1e6
-_STILL_DEG = 12.0
 _ONLY_ANSWER = 0.99
 
 
@@ -110,13 +109,7 @@ def _judged(candidates: tuple[Candidate, ...], seen: Observations, solved: Paper
     """The margin of the first candidate over the best different yaw, and what there is to doubt."""
     rivals = [i for i, c in enumerate(candidates) if c.refined and i and not same_answer(candidates[0], c)]
     margin = candidates[rivals[0]].energy / max(candidates[0].energy, 1e-9) if rivals else float("inf")
-    warnings = []
-    moved = movement_deg(seen.prior)
-    if moved < _STILL_DEG:
-        warnings.append(
-            f"The person hardly moves (joints turn by {moved:.0f} degrees in the video), so markers cannot be told "
-            "apart by their motion: check which bones they were given to."
-        )
+    warnings = list(stillness(seen))
     descents = [stage.descent for yaw in solved.yaws for stage in (yaw.pose, yaw.markers)] + [solved.refined.descent]
     capped = sum(not descent.converged for descent in descents)
     if capped:
