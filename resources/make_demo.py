@@ -20,7 +20,7 @@ from solver.body.model import Body, vertex_normals
 from solver.io.export_c3d import write_c3d
 from solver.markers import Markers
 from solver.synth import Motion, corrupt, demo_motion, marker_paths, place_markers, vary_body
-from solver.synth_truth import Truth, save_truth
+from solver.synth.truth import Truth, save_truth
 
 SEED = 11
 RATE, SECONDS = 100.0, 10.0  # of the markers

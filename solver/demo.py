@@ -13,7 +13,7 @@ from solver.evaluate import Posed, compare, measured_markers, posed, summary_of
 from solver.io.motion_in import MOTION, read_motion
 from solver.pipeline.request import Outcome
 from solver.progress import Progress, silent
-from solver.synth_truth import Truth, load_truth
+from solver.synth.truth import Truth, load_truth
 
 _SHOWN = ("hip_flexion", "knee_angle", "ankle_angle", "arm_flex", "elbow_flex")
 

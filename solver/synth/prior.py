@@ -9,7 +9,7 @@ import numpy as np
 from solver.body.skeleton import JOINTS
 from solver.prior import PosePrior
 from solver.rotations import exp_so3
-from solver.synth_motion import Motion
+from solver.synth.motion import Motion
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import numpy as np
 from solver.body.model import Body
 from solver.body.skeleton import INDEX, JOINTS
 from solver.rotations import exp_so3
+from solver.synth.motion import Motion
 
 LAB_FROM_REST = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 """(3, 3) stands the rest body (y up, facing +z) up in the lab (z up), facing +x."""
@@ -23,27 +24,6 @@ _WALK = (0.5, 4.1)  # s
 _SPEED = 0.95  # m/s
 _LIFT = 0.09  # m, how high a long step lifts the ankle
 _X, _Y, _Z = np.eye(3)
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Poses over time, as ``Body.pose`` takes them.
-
-    Attributes
-    ----------
-    rotations : (T, 24, 3, 3)
-    trans : (T, 3) m
-    rate : Hz
-    """
-
-    rotations: np.ndarray
-    trans: np.ndarray
-    rate: float
-
-    @property
-    def time(self) -> np.ndarray:
-        """(T,) s."""
-        return np.arange(len(self.trans)) / self.rate
 
 
 @dataclass(frozen=True)

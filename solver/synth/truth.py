@@ -14,7 +14,7 @@ from solver.body.model import Body
 from solver.errors import InputError
 from solver.io.atomic import write_bytes_atomic
 from solver.rotations import exp_so3, log_so3
-from solver.synth_motion import Motion
+from solver.synth.motion import Motion
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from solver.body.model import Body, chain
 from solver.body.skeleton import INDEX, JOINTS
 from solver.errors import InputError
 from solver.io.motion import SkeletonMotion
-from solver.rotations import exp_so3, kabsch, log_so3, slerp
-from solver.synth_motion import Motion
+from solver.rotations import exp_so3, kabsch, log_so3
+from solver.synth.motion import Motion, at_rate
 
 _ALIASES = {
     "hip": ("lfemur", "leftupleg", "leftupperleg", "upperlegl", "leftthigh", "thighl", "lthigh", "lefthip", "lhip"),
@@ -102,13 +102,6 @@ def retarget(source: SkeletonMotion, body: Body, betas: np.ndarray, *, rate: flo
                 before = world[f"{side}_{name}"]
     motion = Motion(local, _path(given, local, body, betas, rest), source.rate)
     return motion if rate is None else at_rate(motion, rate)
-
-
-def at_rate(motion: Motion, rate: float) -> Motion:
-    """The motion at another frame rate, over the same time."""
-    time = np.arange(int(np.floor(motion.time[-1] * rate + 1e-6)) + 1) / rate
-    trans = np.stack([np.interp(time, motion.time, column) for column in motion.trans.T], axis=1)
-    return Motion(slerp(motion.rotations, motion.time, time), trans, rate)
 
 
 def match_joints(source: SkeletonMotion) -> dict[str, int]:

@@ -14,9 +14,9 @@ from solver.errors import InputError
 from solver.io.asf_amc import read_asf_amc
 from solver.io.bvh import read_bvh
 from solver.io.motion import SkeletonMotion
-from solver.retarget import match_joints, retarget
 from solver.rotations import exp_so3, log_so3
-from solver.synth_motion import demo_motion
+from solver.synth.demo_motion import demo_motion
+from solver.synth.retarget import match_joints, retarget
 
 FILES = (
     "cmu/02_01.amc",

@@ -7,8 +7,8 @@ import pytest
 
 from solver.body.model import Body
 from solver.rotations import log_so3
-from solver.synth_motion import Motion, demo_motion
-from solver.synth_prior import PriorError, corrupt_prior
+from solver.synth import Motion, demo_motion
+from solver.synth.prior import PriorError, corrupt_prior
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,7 @@ from solver.synth import (
     place_markers,
     vary_body,
 )
-from solver.synth_truth import Truth, load_truth
+from solver.synth.truth import Truth, load_truth
 from solver.video.blazepose import track_pose
 from solver.video.flips import mend_flips
 from solver.video.frames import index_video
