@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
 
 from solver.video.landmarks import Landmarks
+
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QApplication
 
 # A slow machine is no failure: no test is timed.
 settings.register_profile("markerscope", deadline=None)
@@ -30,3 +35,19 @@ def squat_landmarks(shared_data: Path) -> Landmarks:
     from solver.video.blazepose import track_pose
 
     return track_pose(shared_data / "squat_video" / "video.mp4", rate=10)
+
+
+@pytest.fixture(scope="session")
+def qapp() -> QApplication:
+    """The one Qt application of a test run; it draws into memory, whatever display there is."""
+    os.environ["QT_QPA_PLATFORM"] = "offscreen"
+    if sys.platform == "linux":
+        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
+    from PySide6.QtWidgets import QApplication
+
+    from widgets import theme
+
+    app = QApplication.instance() or QApplication([])
+    assert isinstance(app, QApplication)
+    theme.apply(app, "light")
+    return app
