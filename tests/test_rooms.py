@@ -17,6 +17,7 @@ FORBIDDEN = {
     "solver": {"app", "widgets", "tests", *QT, *VTK},
     "widgets": {"app", "solver", "tests"},
     "app": {"tests"},
+    **{f"app/{room}": {"widgets", *QT, *VTK} for room in ("models", "views", "actions")},
     "resources": {"app", "widgets", "tests", *QT},  # its scripts bake the body and render the embedded video
 }
 HEAVY = {"torch", "open3d", "cv2", "av", "ezc3d", "ai_edge_litert", "matplotlib", "jinja2", *QT, *VTK}

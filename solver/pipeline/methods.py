@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache, reduce
+from operator import or_
+from typing import Any
 
 from solver.pipeline.request import Method
 from solver.pipeline.session import Session
@@ -16,6 +19,15 @@ GRAPHS: dict[Method, tuple[Stage, ...]] = {"bundle": GRAPH, "paper": GRAPH_PAPER
 def graph_of(session: Session) -> tuple[Stage, ...]:
     """The stages of the session's method."""
     return GRAPHS[session.run.method]
+
+
+@cache
+def result_type(stage: str) -> Any:
+    """What a stage of that name leaves: the type, or the types where the methods differ."""
+    types = dict.fromkeys(own.result for graph in GRAPHS.values() for own in graph if own.name == stage)
+    if not types:
+        raise ValueError(f"no method has a stage {stage}")
+    return reduce(or_, types)
 
 
 def with_method(session: Session, method: Method) -> Session:
