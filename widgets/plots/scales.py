@@ -1,0 +1,129 @@
+"""Ticks and numbers on axes; no Qt."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+
+def nice_step(rough: float) -> float:
+    """The smallest of 1, 2, 5 times a power of ten that is not below ``rough``."""
+    if not rough > 0 or not math.isfinite(rough):
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(rough))
+    return next(power * k for k in (1, 2, 5, 10) if power * k >= rough * (1 - 1e-9))
+
+
+def ticks(low: float, high: float, most: int) -> list[float]:
+    """Round numbers between two ends, at most about ``most`` of them."""
+    if not high > low:
+        return [low]
+    step = nice_step((high - low) / max(most, 1))
+    first = math.ceil(low / step - 1e-9)
+    return [k * step for k in range(first, math.floor(high / step + 1e-9) + 1)]
+
+
+def log_ticks(low: float, high: float, most: int = 6) -> list[float]:
+    """Powers of ten between two positive ends, with 2 and 5 between them where there is room."""
+    first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
+    stride = max(1, math.ceil((last - first) / max(most, 1)))
+    for inner in ((1, 2, 5), (1, 3), (1,)):
+        found = [k * 10.0**p for p in range(first, last + 1, stride) for k in inner]
+        found = [value for value in found if low * (1 - 1e-9) <= value <= high * (1 + 1e-9)]
+        if len(found) <= most:
+            return found
+    return found
+
+
+def number(value: float, step: float | None = None) -> str:
+    """A number with the digits that its neighbours on the axis (``step`` apart) need."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    if step:
+        digits = max(0, -math.floor(math.log10(abs(step)) + 1e-9))
+        text = f"{value:.{digits}f}"
+    elif value and (abs(value) >= 1e5 or abs(value) < 1e-3):
+        text = f"{value:.1e}"
+    else:
+        text = f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
+    if float(text.replace("−", "-")) == 0:
+        text = text.lstrip("-")
+    return text.replace("-", "−")
+
+
+def clock(seconds: float, step: float = 0.01) -> str:
+    """A time as seconds below a minute, as minutes and seconds beyond."""
+    digits = max(0, -math.floor(math.log10(step) + 1e-9)) if step < 1 else 0
+    sign = "−" if seconds < 0 and round(abs(seconds), digits) > 0 else ""
+    seconds = round(abs(seconds), digits)
+    if seconds < 60:
+        return f"{sign}{seconds:.{digits}f} s"
+    minutes = int(seconds // 60)
+    width = digits + 3 if digits else 2
+    return f"{sign}{minutes}:{seconds - 60 * minutes:0{width}.{digits}f}"
+
+
+def time_ticks(low: float, high: float, most: int) -> tuple[list[float], float]:
+    """Ticks of a clock, and how far apart they are: round in minutes and seconds."""
+    rough = (high - low) / max(most, 1)
+    rounds = (5.0, 10.0, 15.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
+    step = next((s for s in rounds if rough > 2 and s >= rough), nice_step(rough))
+    first = math.ceil(low / step - 1e-9)
+    return [k * step for k in range(first, math.floor(high / step + 1e-9) + 1)], step
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Values to pixels along one direction.
+
+    Attributes
+    ----------
+    low, high : ends in the unit of the values
+    start, end : the pixels they fall on; ``end < start`` for an axis that points up
+    log : True for a logarithmic axis
+    """
+
+    low: float
+    high: float
+    start: float
+    end: float
+    log: bool = False
+
+    def pixel(self, value: np.ndarray | float) -> np.ndarray:
+        """Where a value is drawn."""
+        low, high = (math.log10(self.low), math.log10(self.high)) if self.log else (self.low, self.high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = np.log10(value) if self.log else np.asarray(value, float)
+        return self.start + (values - low) * ((self.end - self.start) / ((high - low) or 1.0))
+
+    def at(self, value: float) -> float:
+        """Where one value is drawn."""
+        return float(self.pixel(value))
+
+    def value(self, pixel: float) -> float:
+        """What is drawn at a pixel."""
+        part = (pixel - self.start) / ((self.end - self.start) or 1.0)
+        if self.log:
+            low, high = math.log10(self.low), math.log10(self.high)
+            return float(10.0 ** (low + part * (high - low)))
+        return self.low + part * (self.high - self.low)
+
+    def ticks(self, apart: float) -> list[float]:
+        """Round values about ``apart`` pixels from each other."""
+        most = max(2, int(abs(self.end - self.start) / max(apart, 1)))
+        return log_ticks(self.low, self.high, most) if self.log else ticks(self.low, self.high, most)
+
+
+def limits(values: list[np.ndarray], lowest: float | None = None, room: float = 0.05) -> tuple[float, float]:
+    """Ends of an axis that holds all finite values, with some room."""
+    finite = [v[np.isfinite(v)] for v in values]
+    finite = [v for v in finite if v.size]
+    if not finite:
+        return (0.0, 1.0) if lowest is None else (lowest, lowest + 1.0)
+    low, high = min(float(v.min()) for v in finite), max(float(v.max()) for v in finite)
+    if lowest is not None:
+        low = min(low, lowest)
+    span = (high - low) or abs(high) or 1.0
+    return (low if lowest is not None and low >= lowest else low - room * span), high + room * span
