@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.body.bones import MODES, with_bone_lengths
 from solver.body.model import Body, vertex_normals
 from solver.body.skeleton import INDEX, JOINTS, PARENTS, mirror_index
 
@@ -43,3 +44,27 @@ def vary_body(body: Body, rng: np.random.Generator, *, bones: float = 0.03, bump
         fall *= headless * np.maximum(normals @ normals[centre], 0)  # not the other side of a limb
         skin = skin + bumps * rng.uniform(-1, 1) * fall[:, None] * normals[centre]
     return replace(body, template=skin, joint_template=new, name=f"{body.name}, varied", digest="", _torch={})
+
+
+def vary_bones(body: Body, rng: np.random.Generator, bones: float = 0.03) -> Body:
+    """A body whose bones differ from what its shape says in ways that the program's own bone lengths reach.
+
+    Parameters
+    ----------
+    bones : standard deviation of a bone's length, as a fraction
+    """
+    lengths = rng.normal(0, 1, len(MODES)) * bones / np.array([mode.share for mode in MODES])
+    return with_lengths(body, lengths)
+
+
+def with_lengths(body: Body, lengths: np.ndarray) -> Body:
+    """The body with coefficients (B,) of ``bones.MODES`` made part of its template."""
+    grown, first = with_bone_lengths(body), body.shape_count
+    return replace(
+        body,
+        template=body.template + grown.shape_dirs[..., first:] @ lengths,
+        joint_template=body.joint_template + grown.joint_dirs[..., first:] @ lengths,
+        name=f"{body.name}, bones varied",
+        digest="",
+        _torch={},
+    )

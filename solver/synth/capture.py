@@ -62,7 +62,7 @@ def corrupt(
     """
     settings = settings or Corruption()
     turns, _ = chain(motion.rotations, body.joints(betas), motion.trans)
-    slide = settings.slide * _sliding(motion, placement, rng)
+    slide = settings.slide * sliding(motion, placement.joint, rng)
     noisy = paths + np.einsum("tmab,tmb->tma", turns[:, placement.joint], slide)
     noisy = noisy + rng.normal(0, settings.jitter, paths.shape)
     noisy[_gaps(paths.shape[:2], motion.rate, rng, settings)] = np.nan
@@ -71,8 +71,8 @@ def corrupt(
     return Markers(noisy[:, order], motion.rate, labels), order
 
 
-def _sliding(motion: Motion, placement: Placement, rng: np.random.Generator) -> np.ndarray:
-    """(T, M, 3) m, how skin slides over bone, in the bone's axes."""
+def sliding(motion: Motion, joint: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """(T, M, 3) m, how skin slides over the bones of joints (M,), in each bone's axes."""
     from scipy.ndimage import gaussian_filter1d
 
     frames = len(motion.trans)
@@ -82,16 +82,16 @@ def _sliding(motion: Motion, placement: Placement, rng: np.random.Generator) -> 
         noise = gaussian_filter1d(rng.normal(size=(frames, count, 3)), 0.15 * motion.rate, axis=0)
         return noise / np.maximum(noise.std(axis=0), 1e-12)
 
-    shared, own = wander(len(JOINTS)), wander(len(placement.joint))
+    shared, own = wander(len(JOINTS)), wander(len(joint))
     # Bending away from the usual pose drags the skin, every marker in its own direction.
     trace = np.trace(motion.rotations, axis1=2, axis2=3)
     angle = np.arccos(np.clip((trace - 1) / 2, -1, 1))
     bent = angle - np.median(angle, axis=0)
-    size = np.array([_SLIDE.get(JOINTS[j].split("_")[-1], _SLIDE_ELSEWHERE) for j in placement.joint]) * 1e-3
+    size = np.array([_SLIDE.get(JOINTS[j].split("_")[-1], _SLIDE_ELSEWHERE) for j in joint]) * 1e-3
     direction = rng.normal(size=(len(size), 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    bound = bent[:, placement.joint, None] * direction
-    return size[:, None] * (0.45 * shared[:, placement.joint] + 0.35 * own + bound) / np.sqrt(3)
+    bound = bent[:, joint, None] * direction
+    return size[:, None] * (0.45 * shared[:, joint] + 0.35 * own + bound) / np.sqrt(3)
 
 
 def _gaps(shape: tuple[int, int], rate: float, rng: np.random.Generator, settings: Corruption) -> np.ndarray:

@@ -1,11 +1,12 @@
-"""The known truth of the embedded session."""
+"""The known truth of a synthetic session, the embedded one among them."""
 
 from __future__ import annotations
 
 import io
 import zipfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,11 +27,15 @@ class Truth:
     body : the body that was filmed and marked, outside the embedded body's shape basis
     betas : (S,) its shape coefficients
     motion : its poses, at the markers' rate and on their clock
-    marker_vertex, marker_joint : (M,) the skin vertex and the joint each marker of the session belongs to
+    marker_vertex, marker_joint : (M,) the skin vertex and the joint each marker of the session belongs to, -1 for what
+        is no marker; a column that changes its marker has the one that it holds longest
     K : (3, 3) px, camera matrix
     R, t : (3, 3) and (3,) m, ``x_camera = R x_lab + t``; x right, y down, z ahead
     image_size : (width, height) px
     offset : s, ``marker_time = video_time + offset``
+    swaps : (S, 4) columns a, b and the first and the end frame between which their markers are exchanged
+    paths : (T, M, 3) m, where the marker of each column was, seen or not; None where it is not known
+    carrier : (T, M) the joint of the marker in each column, frame by frame; None as ``marker_joint``
     """
 
     body: Body
@@ -43,6 +48,9 @@ class Truth:
     t: np.ndarray
     image_size: tuple[int, int]
     offset: float
+    swaps: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.intp))
+    paths: np.ndarray | None = None
+    carrier: np.ndarray | None = None
 
     def surface(self, frames: slice | np.ndarray = slice(None)) -> tuple[np.ndarray, np.ndarray]:
         """Vertices (T, V, 3) and joint centres (T, 24, 3), m, of the chosen marker frames."""
@@ -85,6 +93,9 @@ def load_truth(path: str | Path | None = None) -> Truth:
                 t=data["t"],
                 image_size=(width, height),
                 offset=float(data["offset"]),
+                swaps=data["swaps"] if "swaps" in data else np.zeros((0, 4), np.intp),
+                paths=data["paths"].astype(float) if "paths" in data else None,
+                carrier=data["carrier"].astype(np.intp) if "carrier" in data else None,
             )
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise InputError("the truth of the session cannot be read", path, "install Markerscope again") from error
@@ -93,6 +104,11 @@ def load_truth(path: str | Path | None = None) -> Truth:
 def save_truth(path: str | Path, truth: Truth) -> None:
     """Write what ``load_truth`` reads: the body as its difference from the embedded one."""
     plain = Body.load()
+    more: dict[str, Any] = {} if not len(truth.swaps) else {"swaps": truth.swaps}
+    if truth.paths is not None:
+        more["paths"] = truth.paths.astype(np.float32)
+    if truth.carrier is not None:
+        more["carrier"] = truth.carrier.astype(np.int8)
     data = io.BytesIO()
     np.savez_compressed(
         data,
@@ -110,5 +126,6 @@ def save_truth(path: str | Path, truth: Truth) -> None:
         t=truth.t,
         image_size=np.array(truth.image_size),
         offset=truth.offset,
+        **more,
     )
     write_bytes_atomic(path, data.getvalue())
