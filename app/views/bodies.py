@@ -1,0 +1,181 @@
+"""A body of one shape and its poses over time: a fitted motion, a candidate's ghost, one iteration of a descent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from app.views.posing import Detail, Pose, PosedPoints, fixed_points, mesh_of, pose_at, skin_points
+from app.views.seams import Seams, seams_of
+from solver.body.model import Body
+from solver.markers import Markers
+from solver.prior import PosePrior
+from solver.rotations import exp_so3, slerp
+from solver.solve.paper.results import PaperLocalization, Trace
+from solver.solve.results import Candidate, FittedMotion, Localization
+from solver.sync import Sync
+
+_SAME_TIME_S = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class BodyTrack:
+    """One body over time, drawn at any moment of the marker clock.
+
+    Attributes
+    ----------
+    body : with bone lengths among its shape coefficients
+    betas : (S,) shape, or its first coefficients
+    times : (N,) s, marker clock, when the poses hold; between them they are interpolated
+    rotations, trans : (N, 24, 3, 3) root in the lab, others relative to the parent; (N, 3) m
+    markers : (U,) the markers that have a place on this body
+    vertex : (U,) the vertex below each
+    placement : where each marker's centre belongs, fixed to the body; None where only the vertex is known
+    """
+
+    body: Body
+    betas: np.ndarray
+    times: np.ndarray
+    rotations: np.ndarray
+    trans: np.ndarray
+    markers: np.ndarray
+    vertex: np.ndarray
+    placement: PosedPoints | None = None
+
+    @cached_property
+    def coarse(self) -> PosedPoints:
+        """The coarse mesh, for playing and for ghosts."""
+        return mesh_of(self.body, self.betas, "coarse")
+
+    @cached_property
+    def seams(self) -> Seams:
+        """The edges of the coarse mesh."""
+        return seams_of(self.coarse.faces)
+
+    @cached_property
+    def full(self) -> PosedPoints:
+        """Every vertex."""
+        return mesh_of(self.body, self.betas, "full")
+
+    @cached_property
+    def skin(self) -> PosedPoints:
+        """(U) the vertex below each marker."""
+        return skin_points(self.body, self.betas, self.vertex)
+
+    def nearest(self, time: float) -> int:
+        """The pose whose time is nearest."""
+        right = int(np.clip(np.searchsorted(self.times, time), 1, max(len(self.times) - 1, 1)))
+        right = min(right, len(self.times) - 1)
+        left = max(right - 1, 0)
+        return left if abs(self.times[left] - time) <= abs(self.times[right] - time) else right
+
+    def pose(self, time: float) -> Pose:
+        """The pose at a time, s: a given one where there is one, else between its neighbours."""
+        near = self.nearest(time)
+        if abs(self.times[near] - time) < _SAME_TIME_S or len(self.times) == 1:
+            return Pose(self.rotations[near], self.trans[near])
+        return pose_at(self.times, self.rotations, self.trans, time)
+
+    def is_given(self, time: float) -> bool:
+        """Whether the pose at this time is one of the given, and not interpolated or held."""
+        return bool(abs(self.times[self.nearest(time)] - time) < _SAME_TIME_S)
+
+    def vertices(self, time: float, detail: Detail = "full") -> np.ndarray:
+        """(V, 3) m, float32: the skin at a time."""
+        return self.mesh(detail).at(self.pose(time))
+
+    def faces(self, detail: Detail = "full") -> np.ndarray:
+        """(F, 3) triangles of the skin."""
+        return self.mesh(detail).faces
+
+    def mesh(self, detail: Detail) -> PosedPoints:
+        """The skin to be posed."""
+        return self.full if detail == "full" else self.coarse
+
+    def joints(self, time: float) -> np.ndarray:
+        """(24, 3) m, joint centres at a time."""
+        return self.skin.joints(self.pose(time))
+
+    def skin_places(self, time: float, count: int) -> np.ndarray:
+        """(M, 3) m, the skin below each of ``count`` markers at a time; NaN for those without a place."""
+        return self._spread(self.skin.at(self.pose(time)), count)
+
+    def marker_places(self, time: float, count: int) -> np.ndarray:
+        """(M, 3) m, where each of ``count`` markers belongs at a time; the skin itself where no more is known."""
+        return self._spread((self.placement or self.skin).at(self.pose(time)), count)
+
+    def _spread(self, points: np.ndarray, count: int) -> np.ndarray:
+        out = np.full((count, 3), np.nan)
+        out[self.markers] = points
+        return out
+
+
+def of_motion(body: Body, motion: FittedMotion) -> BodyTrack:
+    """The body of a fit, at every frame."""
+    used = np.flatnonzero(motion.marker_vertex >= 0)
+    return BodyTrack(body, motion.betas, motion.time, motion.rotations, motion.trans, used, motion.marker_vertex[used])
+
+
+def of_candidate(
+    body: Body, candidate: Candidate, found: Localization | PaperLocalization, markers: Markers
+) -> BodyTrack:
+    """A candidate's ghost, known at its keyframes.
+
+    Parameters
+    ----------
+    found : the localization that it was made from, whose frames are frames of ``markers``
+    """
+    placement = fixed_points(body, candidate.betas, candidate.rest, candidate.dirs, candidate.weights)
+    return BodyTrack(
+        body,
+        candidate.betas,
+        markers.time[keyframes_of(candidate, found)],
+        candidate.rotations,
+        candidate.trans,
+        found.markers,
+        candidate.vertex,
+        placement,
+    )
+
+
+def keyframes_of(candidate: Candidate, found: Localization | PaperLocalization) -> np.ndarray:
+    """(N,) the frames that a candidate's poses are of."""
+    if isinstance(found, PaperLocalization):
+        return found.frames
+    return found.many if candidate.refined else found.few
+
+
+def of_hypothesis(
+    body: Body, found: Localization, row: int, prior: PosePrior, sync: Sync, markers: Markers
+) -> BodyTrack:
+    """What a hypothesis started as: the video's body of mean shape, turned and shifted onto the markers."""
+    times = markers.time[found.few]
+    rotations = slerp(prior.rotations, prior.time, (times - sync.offset) / sync.rate_ratio)
+    rotations[:, 0] = found.R_lab_cam[row] @ rotations[:, 0]
+    betas = np.zeros(body.shape_count)
+    trans = found.trans[row] - body.joints(betas)[0]
+    return BodyTrack(body, betas, times, rotations, trans, found.markers, found.vertex[row])
+
+
+def of_iteration(
+    body: Body, trace: Trace, step: int, found: PaperLocalization, markers: Markers, vertex: np.ndarray
+) -> BodyTrack:
+    """The body as one of the iterations that a trace kept had it.
+
+    Parameters
+    ----------
+    step : row of the trace
+    vertex : (U,) of each marker, as the stage has it; none where it has none yet
+    """
+    used = found.markers if len(vertex) else np.zeros(0, dtype=np.intp)
+    return BodyTrack(
+        body,
+        trace.betas[step],
+        markers.time[found.frames[trace.frames]],
+        exp_so3(trace.rotation_vectors[step].astype(float)),
+        trace.trans[step].astype(float),
+        used,
+        vertex,
+    )
