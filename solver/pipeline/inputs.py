@@ -29,7 +29,7 @@ class MarkerSettings:
     up : vertical axis of the file
     units : length unit of the file
     subject : whose markers, where there are several people's
-    rate : Hz
+    rate : Hz, frames a second
     start, stop : s in the file's clock, the range to solve
     """
 

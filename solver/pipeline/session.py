@@ -123,10 +123,16 @@ def session_folder(path: str | Path) -> Path | None:
 def save_session(session: Session) -> None:
     """Write ``session.toml``, whole or not at all."""
     folder = make_folder(session.folder)
+    write_text_atomic(folder / FILE_NAME, tomli_w.dumps(session_document(session)))
+
+
+def session_document(session: Session) -> dict[str, Any]:
+    """What the session file says, as plain tables; paths are relative to the session's folder."""
     inputs = {
-        name: {"path": _relative(file.path, folder), "sha256": file.digest} for name, file in session.inputs.items()
+        name: {"path": _relative(file.path, session.folder), "sha256": file.digest}
+        for name, file in session.inputs.items()
     }
-    content = {
+    return {
         "schema": SCHEMA,
         "program": f"markerscope {__version__}",
         "run": to_table(session.run),
@@ -134,7 +140,6 @@ def save_session(session: Session) -> None:
         "settings": {name: dict(table) for name, table in session.settings.items()},
         "edits": {name: dict(table) for name, table in session.edits.items()},
     }
-    write_text_atomic(folder / FILE_NAME, tomli_w.dumps(content))
 
 
 def load_session(path: str | Path) -> Session:
@@ -154,6 +159,21 @@ def load_session(path: str | Path) -> Session:
         raise InputError(f"cannot be read: {error.strerror or error}", file, "check its permissions") from error
     except ValueError as error:
         raise InputError(f"is not a session file: {error}", file, _START_AGAIN) from error
+    return session_from(content, folder, file)
+
+
+def session_from(content: Mapping[str, Any], folder: Path, file: Path) -> Session:
+    """The session that ``session_document`` described.
+
+    Parameters
+    ----------
+    folder : the session's, absolute; relative paths begin there
+    file : where the tables were read, for messages
+
+    Raises
+    ------
+    InputError : they are damaged, or a later version of the program wrote them
+    """
     schema = content.get("schema")
     if not isinstance(schema, int) or schema < 1:
         raise InputError("does not say which schema it has", file, "start again from the markers")

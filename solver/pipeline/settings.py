@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -57,6 +57,13 @@ def overlay(table: Mapping[str, Any], over: Mapping[str, Any], where: str = "set
     unset += [name for name in _names(over.get(UNSET, []), where) if name not in unset]
     merged = {name: value for name, value in {**table, **over}.items() if name not in (UNSET, *unset)}
     return merged | ({UNSET: unset} if unset else {})
+
+
+def without(table: Mapping[str, Any], names: Collection[str]) -> dict[str, Any]:
+    """A table that no longer says anything of these settings."""
+    kept = {name: value for name, value in table.items() if name not in (UNSET, *names)}
+    unset = [name for name in table.get(UNSET, ()) if name not in names]
+    return kept | ({UNSET: unset} if unset else {})
 
 
 def _names(value: Any, where: str) -> list[str]:

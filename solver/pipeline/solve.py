@@ -20,7 +20,7 @@ from solver.pipeline.methods import GRAPHS, graph_of, with_method
 from solver.pipeline.output import remove_if_empty
 from solver.pipeline.request import Method, SolveOutcome, SolveRequest
 from solver.pipeline.session import InputFile, RunSettings, Session, load_session, save_session, session_folder
-from solver.pipeline.settings import UNSET, overlay
+from solver.pipeline.settings import UNSET, overlay, without
 from solver.pipeline.stage import GraphRun, OnEvent, Source, ignore, run_graph, stage_keys
 from solver.pipeline.stages import SOURCES
 from solver.progress import Progress, part_of, silent
@@ -122,7 +122,7 @@ def _with_options(session: Session, request: SolveRequest) -> Session:
     settings, edits = dict(session.settings), dict(session.edits)
     for stage, said in {**_said(request), **_capped(request, session.run.method)}.items():
         settings[stage] = overlay(settings.get(stage, {}), said)
-        edits[stage] = _without(edits.get(stage, {}), {*said, *said.get(UNSET, ())})
+        edits[stage] = without(edits.get(stage, {}), {*said, *said.get(UNSET, ())})
     return replace(
         session,
         settings=settings,
@@ -161,13 +161,6 @@ def _capped(request: SolveRequest, method: Method) -> dict[str, dict[str, Any]]:
     if not capped:
         raise InputError(f"method {method} has no such cap", "--iterations", "leave it out, or use --method paper")
     return {name: {"iterations": request.iterations} for name in capped}
-
-
-def _without(table: Mapping[str, Any], names: set[str]) -> dict[str, Any]:
-    """A table of edits that no longer says anything of these settings."""
-    kept = {name: value for name, value in table.items() if name not in (UNSET, *names)}
-    unset = [name for name in table.get(UNSET, ()) if name not in names]
-    return kept | ({UNSET: unset} if unset else {})
 
 
 def _spelt_out(session: Session, digests: Mapping[str, str]) -> Session:

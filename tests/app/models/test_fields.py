@@ -1,0 +1,90 @@
+"""Settings as records: units, ranges and meaning come from where the settings are documented."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+
+from app.models.fields import descriptions, setting_of, settings_of, title
+from solver.pipeline.inputs import MarkerSettings, SyncSettings
+from solver.pipeline.methods import GRAPHS
+from solver.pipeline.stages_paper import PaperSegmentSettings
+from solver.segment import SegmentSettings
+
+ALL = [setting for graph in GRAPHS.values() for stage in graph for setting in settings_of(stage.name, stage.settings())]
+
+
+@dataclass(frozen=True)
+class Made:
+    """Something.
+
+    Attributes
+    ----------
+    first, second : mm, of both,
+        and this goes on
+    third : degrees
+    fourth : whatever it is
+
+    first : not of the section any more
+    """
+
+    first: float = 1.0
+    second: float = 2.0
+    third: float | None = None
+    fourth: tuple[int, ...] = ()
+
+
+def test_docstrings_are_read() -> None:
+    assert descriptions(Made) == {
+        "first": "mm, of both, and this goes on",
+        "second": "mm, of both, and this goes on",
+        "third": "degrees",
+        "fourth": "whatever it is",
+    }
+    first, second, third = settings_of("made", Made())
+    assert (first.unit, first.help, second.help) == ("mm", "Of both, and this goes on.", first.help)
+    assert (third.unit, third.help, third.optional) == ("deg", "", True)
+
+
+def test_lengths_are_shown_in_millimetres_and_go_back_exactly() -> None:
+    threshold = setting_of("segment", SegmentSettings(threshold=0.0081), "threshold")
+    assert (threshold.value, threshold.default, threshold.unit) == (8.1, 8.0, "mm")
+    assert threshold.inner(threshold.value) == 0.0081
+    assert (threshold.minimum, threshold.maximum) == (0.0, 100.0)
+    assert threshold.said(8.1) == "8.1 mm"
+    assert threshold.changed
+
+
+def test_a_class_that_extends_another_keeps_its_words_and_has_its_own_defaults() -> None:
+    far = setting_of("segment", PaperSegmentSettings(), "far")
+    assert far.default == 0.0
+    assert "held apart" in far.help
+
+
+def test_choices_and_what_is_left_to_the_program() -> None:
+    up = setting_of("markers", MarkerSettings(), "up")
+    assert (up.kind, up.choices, up.optional, up.said(None)) == ("choice", ("x", "y", "z"), True, "automatic")
+    offset = setting_of("sync", SyncSettings(), "offset")
+    assert (offset.kind, offset.unit, offset.value) == ("float", "s", None)
+    start = setting_of("markers", MarkerSettings(), "start")
+    assert (start.unit, start.help[:8]) == ("s", "In the f")
+
+
+def test_edits_that_no_form_can_show_are_left_out() -> None:
+    names = {setting.name for setting in settings_of("segment", SegmentSettings())}
+    assert names == {"threshold", "groups", "far", "far_penalty", "max_frames", "min_overlap"}
+
+
+@pytest.mark.parametrize("setting", ALL, ids=lambda setting: f"{setting.stage}.{setting.name}")
+def test_every_setting_has_its_meaning_and_a_range_around_its_default(setting) -> None:
+    assert setting.help
+    assert setting.help.endswith(".")
+    if setting.kind in ("float", "int"):
+        assert setting.minimum < setting.maximum
+        assert setting.default is None or setting.minimum <= setting.default <= setting.maximum
+    assert setting.inner(setting.value) == setting.inner(setting.default)
+
+
+def test_every_stage_has_a_title() -> None:
+    assert all(title(stage.name)[0].isupper() for graph in GRAPHS.values() for stage in graph)
