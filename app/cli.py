@@ -13,15 +13,17 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn, get_args
 
-from app.cli_commands import SERVICES, Services, run_demo, run_evaluate, run_solve
+from app.cli_commands import SERVICES, Services, run_bench, run_demo, run_evaluate, run_solve
 from app.cli_endings import CANCELLED, REFUSED, ended
 from solver import __version__
+from solver.bench.request import OUT, names
 from solver.pipeline.request import Convention, Method, Units, Up, parse_range
 
 COMMANDS = {
     "demo": "solve the embedded session and say how close it came to the known truth",
     "solve": "from markers and a video to a body, named markers and joint angles",
     "evaluate": "how far a result is from another one or from a reference",
+    "bench": "how good the methods are on synthetic sessions whose truth is known",
 }
 
 
@@ -85,6 +87,11 @@ def _parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--body", type=Path, metavar="FILE", help="SMPL-layout model of the reference")
     _common(evaluate)
     evaluate.set_defaults(run=run_evaluate)
+
+    bench = commands.add_parser("bench", help=COMMANDS["bench"], description=_sentence("bench"))
+    _bench_options(bench)
+    _common(bench)
+    bench.set_defaults(run=run_bench)
     return parser
 
 
@@ -114,6 +121,25 @@ def _solve_options(solve: argparse.ArgumentParser) -> None:
     how.add_argument("--iterations", type=int, metavar="N", help="of each optimisation at most (method paper)")
     how.add_argument("--convention", choices=get_args(Convention), help="names and signs of the angles")
     how.add_argument("--seed", type=int, metavar="N", help="of every random choice (default: 0)")
+
+
+def _bench_options(bench: argparse.ArgumentParser) -> None:
+    bench.add_argument("suite", metavar="SUITE", help="accuracy, parts, scaling, ablation or short")
+    bench.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="tables and records (default: %(default)s)")
+
+    what = bench.add_argument_group("what is run")
+    what.add_argument("--motions", type=Path, metavar="DIR", help="movements: BVH files, AMC files and their ASF")
+    what.add_argument("--motion-count", type=int, metavar="N", help="movements of the folder (default: 5)")
+    what.add_argument("--methods", type=names, metavar="A,B", help="methods to compare (default: the suite's)")
+    what.add_argument("--cases", type=names, metavar="A,B", help="some of the suite's cases")
+    what.add_argument("--seeds", type=int, metavar="N", help="sessions of each case and movement (default: 1)")
+    what.add_argument("--frames", type=int, metavar="N", help="frames of a session (default: 450)")
+    what.add_argument("--gaps", type=Path, metavar="FILE", help="statistics of real gaps, for the case real-gaps")
+    what.add_argument("--iterations", type=int, metavar="N", help="cap of the published method's optimisations")
+
+    how = bench.add_argument_group("how it is run")
+    how.add_argument("--workers", type=int, metavar="N", help="runs at a time (default: one a core)")
+    how.add_argument("--limit", type=float, metavar="SECONDS", help="time that one run may take")
 
 
 def _common(parser: argparse.ArgumentParser) -> None:

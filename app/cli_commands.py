@@ -9,6 +9,7 @@ from pathlib import Path
 
 from app.cli_output import Terminal
 from resources import resource
+from solver.bench.request import BenchRequest
 from solver.errors import InputError
 from solver.pipeline.request import EvaluateRequest, Outcome, SolveOutcome, SolveRequest, check_inputs
 from solver.progress import Progress
@@ -35,6 +36,12 @@ def _judge_demo(result: Path, progress: Progress) -> Outcome:
     return judge_demo(result, progress)
 
 
+def _bench(request: BenchRequest, progress: Progress) -> Outcome:
+    from solver.bench import run_bench
+
+    return run_bench(request, progress)
+
+
 @dataclass(frozen=True)
 class Services:
     """The solver's functions that the commands call, loaded when they are needed."""
@@ -42,6 +49,7 @@ class Services:
     solve: Callable[[SolveRequest, Progress], SolveOutcome] = _solve
     evaluate: Callable[[EvaluateRequest, Progress], Outcome] = _evaluate
     judge_demo: Callable[[Path, Progress], Outcome] = _judge_demo
+    bench: Callable[[BenchRequest, Progress], Outcome] = _bench
 
 
 SERVICES = Services()
@@ -77,6 +85,15 @@ def run_evaluate(options: argparse.Namespace, services: Services) -> int:
     with Terminal(options) as terminal:
         check_inputs(request)
         terminal.show(services.evaluate(request, terminal.progress))
+    return 0
+
+
+def run_bench(options: argparse.Namespace, services: Services) -> int:
+    """``markerscope bench``."""
+    given = {field.name: getattr(options, field.name) for field in fields(BenchRequest)}
+    request = BenchRequest(**{name: value for name, value in given.items() if value is not None})
+    with Terminal(options) as terminal:
+        terminal.show(services.bench(request, terminal.progress))
     return 0
 
 

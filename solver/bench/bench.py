@@ -1,0 +1,155 @@
+"""The benchmark from request to table."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from solver import __version__
+from solver.bench.cases import FRAMES, Case, cases_of
+from solver.bench.cold import cold_seconds
+from solver.bench.execute import Run, with_key
+from solver.bench.keys import key_of
+from solver.bench.machine import machine
+from solver.bench.methods import method_named
+from solver.bench.motions import MotionSource, find_motions
+from solver.bench.request import BenchRequest
+from solver.bench.runner import plain, run_all
+from solver.bench.table import bins_of, markdown_of, rows_of
+from solver.io.atomic import make_folder, write_text_atomic
+from solver.parallel import cores
+from solver.pipeline.request import Outcome
+from solver.progress import Progress, part_of, silent
+
+_METHODS: dict[str, tuple[str, ...]] = {"scaling": ("bundle",)}
+_STEPWISE = ("ablation",)
+FILES = ("bench.md", "bench.json")
+
+
+def run_bench(request: BenchRequest, progress: Progress = silent) -> Outcome:
+    """What ``markerscope bench`` does.
+
+    Raises
+    ------
+    InputError : a suite, case, method or folder that there is not, or a folder that cannot be written
+    """
+    cases = cases_of(request.suite, request.cases, request.frames or FRAMES, request.gaps)
+    methods = request.methods or _METHODS.get(request.suite, ("bundle",))
+    for name in methods:
+        method_named(name)
+    motions = find_motions(request.motions, request.motion_count)
+    make_folder(request.out)
+    runs = runs_of(request, cases, methods, motions)
+    records, computed = run_all(runs, request.out, request.workers or cores(), part_of(progress, 0.0, 0.97))
+    cold = _cold(request.out, runs, part_of(progress, 0.97, 1.0))
+    header = _header(request, cases, methods, motions)
+    rows, bins = rows_of(records, cold), bins_of(records)
+    table = markdown_of(rows, bins)
+    summary = {
+        **header,
+        "rows": [dataclasses.asdict(row) for row in rows],
+        "calibration": [dataclasses.asdict(entry) for entry in bins],
+        "runs": [record["key"] for record in records],
+    }
+    text = f"{_said(header, cases, methods)}\n{table}{_failures(records)}"
+    write_text_atomic(request.out / "bench.md", text)
+    write_text_atomic(request.out / "bench.json", json.dumps(plain(summary), indent=1) + "\n")
+    progress(1.0, "done")
+    counts = {status: sum(r["status"] == status for r in records) for status in ("done", "failed", "timed out")}
+    last = f"{len(records)} runs, {computed} of them computed now; tables and records are in {request.out}."
+    return Outcome(
+        summary={**summary, "out": str(request.out), "computed": computed, "counts": counts},
+        lines=(*text.splitlines(), last),
+    )
+
+
+def runs_of(
+    request: BenchRequest, cases: Sequence[Case], methods: Sequence[str], motions: Sequence[MotionSource]
+) -> list[Run]:
+    """Every run, in an order in which an unfinished benchmark has some of everything."""
+    runs = [
+        Run(
+            "",
+            case,
+            motion,
+            method,
+            seed,
+            request.iterations,
+            request.limit,
+            stepwise=request.suite in _STEPWISE,
+        )
+        for seed in range(request.seeds)
+        for motion in motions
+        for case in cases
+        for method in methods
+    ]
+    return [with_key(run, key_of(run)) for run in runs]
+
+
+def _cold(folder: Path, runs: Sequence[Run], progress: Progress) -> dict[tuple[str, str], float]:
+    """s, by case and method: the first case's first run of each method again, in a process of its own."""
+    first = {run.method: run for run in reversed(runs) if run.case == runs[0].case}
+    found: dict[tuple[str, str], float] = {}
+    for i, (method, run) in enumerate(first.items()):
+        path = folder / "runs" / f"cold-{run.key}.json"
+        try:
+            seconds = json.loads(path.read_text(encoding="utf-8"))["cold_s"]
+        except (OSError, ValueError, KeyError, TypeError):
+            progress(i / len(first), f"{method} in a fresh process")
+            seconds = cold_seconds(run)
+            write_text_atomic(path, json.dumps({"cold_s": seconds}) + "\n")
+        if seconds is not None:
+            found[run.case.name, method] = float(seconds)
+    return found
+
+
+def _header(
+    request: BenchRequest, cases: Sequence[Case], methods: Sequence[str], motions: Sequence[MotionSource]
+) -> dict[str, Any]:
+    return {
+        "suite": request.suite,
+        "command": request.command,
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        "version": __version__,
+        "machine": machine(),
+        "workers": request.workers or cores(),
+        "motions": [motion.name for motion in motions],
+        "seeds": request.seeds,
+        "iterations": request.iterations,
+        "cases": {case.name: case.about for case in cases},
+        "methods": {name: method_named(name).about for name in methods},
+    }
+
+
+def _said(header: Mapping[str, Any], cases: Sequence[Case], methods: Sequence[str]) -> str:
+    on = header["machine"]
+    memory = "" if on["memory_gb"] is None else f", {on['memory_gb']:g} GB"
+    cap = header["iterations"]
+    lines = [
+        f"`{header['command']}`",
+        "",
+        f"{header['date']}, Markerscope {header['version']}, {on['processor']}, {on['cores']} cores{memory}, "
+        f"{on['system']}, Python {on['python']}; {header['workers']} runs at a time, one thread each.",
+        "",
+        f"Synthetic: bodies, markers, their errors and the video's poses; the movements are "
+        f"{', '.join(header['motions'])}, {header['seeds']} sessions of each. "
+        "A figure is the median over the runs, the worst in brackets.",
+        "",
+    ]
+    if cap is not None and any(name.startswith(("paper", "registration")) for name in methods):
+        lines += [f"The published method was stopped after {cap} iterations of each optimisation.", ""]
+    return "\n".join(lines)
+
+
+def _failures(records: Sequence[Mapping[str, Any]]) -> str:
+    """The sentences of runs without an answer, each once."""
+    counts: dict[str, int] = {}
+    for record in records:
+        if record["status"] != "done":
+            sentence = f"{record['method']}, {record['status']}: {record['sentence']}"
+            counts[sentence] = counts.get(sentence, 0) + 1
+    return "".join(["\nRuns without an answer:\n\n", *(f"- {n} x {s}\n" for s, n in counts.items())]) if counts else ""

@@ -1,0 +1,130 @@
+"""Runs spread over processes; what has been computed before is not computed again."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import signal
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from solver.bench.execute import Run, execute
+from solver.io.atomic import make_folder, write_text_atomic
+from solver.progress import Progress, silent
+
+_THREADS = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+_DIED = "The worker process ended without a result; the memory may have been used up."
+
+
+def run_all(
+    runs: Sequence[Run], folder: Path, workers: int, progress: Progress = silent
+) -> tuple[list[dict[str, Any]], int]:
+    """The records of all runs, in their order, and how many of them were computed now.
+
+    Each is kept as ``FOLDER/runs/KEY.json``, written under a temporary name and renamed.
+    """
+    make_folder(folder / "runs")
+    waiting = [run for run in runs if load_record(folder, run.key) is None]
+    total = len(waiting)
+    for done, record in enumerate(_computed(waiting, workers), 1):
+        write_text_atomic(record_path(folder, record["key"]), json.dumps(plain(record), indent=1) + "\n")
+        what = f"{record['case']}, {record['method']}, {record['motion']}, seed {record['seed']}"
+        progress(done / total, f"run {done} of {total}: {what}: {_said(record)}")
+    records = (load_record(folder, run.key) for run in runs)
+    return [record for record in records if record is not None], total
+
+
+def record_path(folder: Path, key: str) -> Path:
+    """Where a run's record is."""
+    return folder / "runs" / f"{key}.json"
+
+
+def load_record(folder: Path, key: str) -> dict[str, Any] | None:
+    """A run's record, None where there is none that can be read."""
+    try:
+        record = json.loads(record_path(folder, key).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return record if isinstance(record, dict) and record.get("key") == key else None
+
+
+def plain(value: Any) -> Any:
+    """JSON values; a number that is not finite becomes null."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if abs(value) < float("inf") else None
+    return value if isinstance(value, bool | int | str | None) else str(value)
+
+
+def _said(record: dict[str, Any]) -> str:
+    return f"{record['mpjpe_mm']:.1f} mm" if record["status"] == "done" else str(record["status"])
+
+
+def _computed(runs: Sequence[Run], workers: int) -> Iterator[dict[str, Any]]:
+    """Records as they come. Runs that were in flight when a worker died are tried once more, each by itself."""
+    suspects: list[Run] = []
+    queue = list(reversed(runs))
+    while queue:
+        with _pool(min(workers, len(queue))) as pool:
+            flying: dict[Future[dict[str, Any]], Run] = {}
+            try:
+                while queue or flying:
+                    while queue and len(flying) < workers:
+                        run = queue.pop()
+                        flying[pool.submit(execute, run)] = run
+                    for future in wait(flying, return_when=FIRST_COMPLETED).done:
+                        yield future.result()
+                        del flying[future]
+            except BrokenProcessPool:
+                suspects += flying.values()
+    for run in suspects:
+        with _pool(1) as pool:
+            try:
+                yield pool.submit(execute, run).result()
+            except BrokenProcessPool:
+                about = {"key": run.key, "case": run.case.name, "method": run.method, "motion": run.motion.name}
+                yield about | {"seed": run.seed, "iterations": run.iterations, "status": "failed", "sentence": _DIED}
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Spawned workers of one thread each, that end at once when the block is left by an exception."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))  # read by the libraries as a worker imports them
+    others = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _started)
+    try:
+        yield pool
+    except BaseException:
+        for process in set(multiprocessing.active_children()) - others:
+            process.terminate()
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+    pool.shutdown()
+
+
+def _started() -> None:
+    """Ctrl+C in a terminal reaches the workers too; whether to stop is the parent's decision."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
