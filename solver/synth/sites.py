@@ -86,22 +86,27 @@ def uniform_sites(
     allowed = np.flatnonzero(markable(body, part))
     area = face_areas(surface, body.faces[allowed])
     owner = body.weights[body.faces[allowed]].mean(axis=1).argmax(axis=1)
-    first = [] if part is None else [INDEX[name] for name in PARTS[part] for _ in range(_PER_BONE)]
+    own = [] if part is None else [INDEX[name] for name in PARTS[part]]
+    first = [bone for bone in own for _ in range(_PER_BONE)]
     if count < len(first):
-        what = f"{count} markers are too few for {len(first) // _PER_BONE} bones"
+        what = f"{count} markers are too few for {len(own)} bones"
         raise InputError(what, f"the {part}".replace("_", " "), f"ask for {len(first)} or more")
     corners, shares, points = np.empty((count, 3), np.intp), np.empty((count, 3)), np.full((count, 3), np.inf)
     for m in range(count):
         chance = np.where(owner == first[m], area, 0) if m < len(first) else area
         picked = rng.choice(len(allowed), size=_TRIES, p=chance / chance.sum())
         where = _in_triangle(rng.random((_TRIES, 2)))
-        drawn = np.einsum("nk,nka->na", where, surface[body.faces[allowed[picked]]])
+        chosen = body.faces[allowed[picked]]
+        drawn = np.einsum("nk,nka->na", where, surface[chosen])
         free = (np.linalg.norm(drawn[:, None] - points[None, :m], axis=2) >= apart).all(axis=1)
+        if own:
+            bone = np.einsum("nk,nkj->nj", where, body.weights[chosen]).argmax(axis=1)
+            free &= np.isin(bone, first[m] if m < len(first) else own)
         if not free.any():
             what = f"{count} markers do not fit {1000 * apart:g} mm apart"
             raise InputError(what, "the skin" if part is None else f"the {part}".replace("_", " "), "ask for fewer")
         k = int(free.argmax())
-        corners[m], shares[m], points[m] = body.faces[allowed[picked[k]]], where[k], drawn[k]
+        corners[m], shares[m], points[m] = chosen[k], where[k], drawn[k]
     return sites_at(body, betas, corners, shares)
 
 
