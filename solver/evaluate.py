@@ -114,7 +114,23 @@ def evaluate(
     bodies = {path: _load_body(path) for path in {own_body, other_body}}
     ours, notes = posed(found, _times(found), bodies[own_body], known=own_body is not None)
     theirs, other_notes = posed(other, clock, bodies[other_body], known=other_body is not None)
+    if body is None:
+        theirs = _on_true_body(theirs, other.source)
     return compare(ours, theirs, measured_markers(result), other.source, (*clock_notes, *notes, *other_notes), progress)
+
+
+def _on_true_body(reference: Posed, source: str) -> Posed:
+    """The reference of a synthetic session on the body that it was made with, which no shape coefficients reach."""
+    from solver.synth.files import REFERENCE
+    from solver.synth.truth import TRUTH, load_truth
+
+    beside = Path(source).with_name(TRUTH)
+    if Path(source).name != REFERENCE or not beside.is_file():
+        return reference
+    truth = load_truth(beside)
+    if len(truth.motion.trans) != len(reference.time):
+        return reference
+    return Posed(truth.body, truth.betas, reference.time, truth.motion.rotations, truth.motion.trans, truth.joints)
 
 
 def compare(

@@ -45,6 +45,7 @@ class SynthSession:
     nominal_offset : s, what the user believes of the clocks: marker time = video time + offset
     truth : what made it, on the markers' frames
     settings, seed : which draw the same session again
+    motion : file or name of the motion, empty where it has none
     """
 
     markers: Markers
@@ -53,6 +54,7 @@ class SynthSession:
     truth: Truth
     settings: SynthSettings
     seed: int
+    motion: str = ""
 
 
 def synthesise(motion: Motion | SkeletonMotion | str, settings: SynthSettings, seed: int) -> SynthSession:
@@ -99,7 +101,9 @@ def synthesise(motion: Motion | SkeletonMotion | str, settings: SynthSettings, s
         carrier=bone[held],
     )
     labels = tuple(f"M{i + 1:02d}" for i in range(count))
-    return SynthSession(Markers(columns[:, order], settings.rate, labels), prior, 0.0, truth, settings, seed)
+    markers = Markers(columns[:, order], settings.rate, labels)
+    source = motion if isinstance(motion, str) else getattr(motion, "source", "")
+    return SynthSession(markers, prior, 0.0, truth, settings, seed, source)
 
 
 def _body(settings: SynthSettings, seed: int) -> tuple[Body, np.ndarray]:

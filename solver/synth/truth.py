@@ -17,6 +17,8 @@ from solver.io.atomic import write_bytes_atomic
 from solver.rotations import exp_so3, log_so3
 from solver.synth.motion import Motion
 
+TRUTH = "truth.npz"
+
 
 @dataclass(frozen=True)
 class Truth:
@@ -66,18 +68,19 @@ class Truth:
 
 def load_truth(path: str | Path | None = None) -> Truth:
     """The truth beside the embedded session, or in another ``truth.npz`` of the same maker."""
-    path = resource("demo", "truth.npz") if path is None else Path(path)
+    remedy = "install Markerscope again" if path is None else "make the session anew"
+    path = resource("demo", TRUTH) if path is None else Path(path)
     body = Body.load()
     try:
         with np.load(path, allow_pickle=False) as data:
             if str(data["body"]) != body.digest:
-                raise InputError("the session was made for another body", path, "run python -m resources.make_demo")
+                raise InputError("the session was made for another body", path, "make it anew")
             turns = exp_so3(data["rotation_vectors"].astype(float))
             moved = replace(
                 body,
                 template=body.template + data["surface_offset"].astype(float),
                 joint_template=body.joint_template + data["joint_offset"],
-                name="of the embedded session",
+                name="of a synthetic session",
                 digest="",
                 _torch={},
             )
@@ -98,7 +101,7 @@ def load_truth(path: str | Path | None = None) -> Truth:
                 carrier=data["carrier"].astype(np.intp) if "carrier" in data else None,
             )
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError("the truth of the session cannot be read", path, "install Markerscope again") from error
+        raise InputError("the truth of the session cannot be read", path, remedy) from error
 
 
 def save_truth(path: str | Path, truth: Truth) -> None:
