@@ -6,6 +6,8 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from widgets import palette
+from widgets.plots.affinity import AffinityView
+from widgets.plots.pair import PairPlot
 from widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
 from widgets.plots.timelines import Timelines
 
@@ -68,4 +70,58 @@ def timelines() -> QWidget:
     return made
 
 
-EXAMPLES = {"timelines": timelines}
+def rigid_groups(markers: int = 30, groups: int = 7) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A made-up matrix (M, M) m of groups that move rigidly, its linkage and the order of its tree."""
+    from scipy.cluster.hierarchy import leaves_list, linkage
+    from scipy.spatial.distance import squareform
+
+    rng = np.random.default_rng(2)
+    group = rng.integers(0, groups, markers)
+    between = rng.uniform(0.02, 0.16, (groups, groups))
+    matrix = np.where(group[:, None] == group, 0.003, np.maximum(between, between.T)[group][:, group])
+    matrix = matrix * rng.uniform(0.5, 1.6, (markers, markers))
+    matrix = np.triu(matrix, 1)
+    matrix += matrix.T
+    tree = linkage(squareform(matrix), "average")
+    return matrix, tree, leaves_list(tree)
+
+
+def affinity_view() -> QWidget:
+    """30 markers; the groups follow the cut."""
+    from scipy.cluster.hierarchy import fcluster
+
+    matrix, tree, order = rigid_groups()
+    made = AffinityView()
+
+    def groups_at(cut: float) -> np.ndarray:
+        found = fcluster(tree, cut, "distance")[order]
+        first = {group: k for k, group in enumerate(dict.fromkeys(found.tolist()))}
+        groups = np.zeros(len(order), int)
+        groups[order] = [first[group] for group in found.tolist()]
+        return groups
+
+    def recut(cut: float) -> None:
+        groups = groups_at(cut)
+        made.set_clusters(groups, palette.categorical(groups.max() + 1)[groups], cut)
+
+    made.cut_dragged.connect(recut)
+    groups = groups_at(0.008)
+    inks = palette.categorical(groups.max() + 1)[groups]
+    made.set_data(matrix, order, tree, [f"M{k:02d}" for k in range(30)], 0.008, groups, inks)
+    made.set_selected([int(order[3])], (int(order[3]), int(order[12])))
+    made.resize(560, 620)
+    return made
+
+
+def pair_plot() -> QWidget:
+    """A pair that is nearly rigid, with a gap."""
+    made, time = PairPlot(), np.arange(600) / 30
+    distance = 0.183 + 0.002 * np.sin(2 * time) + np.random.default_rng(1).normal(0, 4e-4, 600)
+    distance[200:260] = np.nan
+    made.set_pair("M03", "M12", time, distance)
+    made.set_time(12.3)
+    made.resize(560, 170)
+    return made
+
+
+EXAMPLES = {"timelines": timelines, "affinity": affinity_view, "pair": pair_plot}

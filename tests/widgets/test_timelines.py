@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QImage, QWheelEvent
+from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolButton, QWidget
 
+from tests.widgets.drawn import pixels
 from widgets import palette, theme
 from widgets.plots.decimate import Counts, envelope, shown_frames
 from widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
@@ -48,12 +49,6 @@ def shown(qapp: QApplication) -> Iterator[Timelines]:
     qapp.processEvents()
     yield made
     made.close()
-
-
-def pixels(widget: QWidget) -> np.ndarray:
-    image = widget.grab().toImage().convertToFormat(QImage.Format.Format_RGB888)
-    data = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.bytesPerLine())
-    return data[:, : 3 * image.width()].reshape(image.height(), image.width(), 3).copy()
 
 
 def near(picture: np.ndarray, at: tuple[float, float], rgb: object) -> bool:

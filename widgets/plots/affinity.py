@@ -1,0 +1,358 @@
+"""Which markers move rigidly together: the matrix of their pairs, and the tree to cut by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QContextMenuEvent,
+    QFontMetricsF,
+    QHelpEvent,
+    QIcon,
+    QImage,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPixmap,
+)
+from PySide6.QtWidgets import QMenu, QToolTip, QWidget
+
+from widgets import palette
+from widgets.icons import icon
+from widgets.plots import affinity_paint as paint
+from widgets.plots.affinity_paint import MM, Places
+from widgets.plots.dendrogram import Dendrogram
+from widgets.plots.ink import colour, em, pen, runs
+from widgets.plots.scales import Scale, number
+from widgets.theme import colours
+
+_REACH = 7.0
+"""px from the cut within which it is grabbed."""
+
+
+class AffinityView(QWidget):
+    """Matrix and dendrogram on the same columns; a line through the tree that is dragged up and down.
+
+    Up and Down move the cut, Left and Right go from marker to marker, the menu key (or a right click) offers the edits.
+
+    Signals
+    -------
+    cut_dragged(height) : m, while the line is dragged; whoever knows the groups answers with :meth:`set_clusters`
+    cut_committed(height) : m, as it is let go or moved by a key
+    pair_clicked(i, j) : a cell of the matrix
+    leaves_clicked(markers, modifiers) : a label, a group's strip, or all below a branch
+    edit_requested(kind, markers, target) : "merge", "split", "leave_out", or "move" to the group ``target`` (else -1)
+    """
+
+    cut_dragged = Signal(float)
+    cut_committed = Signal(float)
+    pair_clicked = Signal(int, int)
+    leaves_clicked = Signal(list, object)
+    edit_requested = Signal(str, list, int)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Affinity of the markers")
+        self.setAccessibleDescription("Standard deviation of the distance of every two markers, and the tree of groups")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setMouseTracking(True)
+        self._matrix = np.zeros((0, 0))
+        self._tree = Dendrogram(np.zeros((0, 4)), np.zeros(0, np.intp))
+        self._order = np.zeros(0, np.intp)
+        self._labels: list[str] = []
+        self._clusters = np.zeros(0, np.intp)
+        self._colours = np.zeros((0, 3), np.uint8)
+        self._cut = 0.0
+        self._ends = (1.0, 100.0)
+        self._image: QImage | None = None
+        self._selected: frozenset[int] = frozenset()
+        self._pair: tuple[int, int] | None = None
+        self._dragging = False
+
+    def set_data(
+        self,
+        matrix: np.ndarray,
+        order: np.ndarray,
+        linkage: np.ndarray,
+        labels: Sequence[str],
+        cut: float,
+        clusters: np.ndarray,
+        marker_colours: np.ndarray,
+        leaves: np.ndarray | None = None,
+    ) -> None:
+        """Show another tree.
+
+        Parameters
+        ----------
+        matrix : (M, M) m, standard deviation of each pair's distance; NaN where unknown
+        order : (U,) the markers of the tree from left to right
+        linkage : (U - 1, 4) as scipy writes it, heights in m
+        labels : M names
+        cut : m
+        clusters : (M,) group of each marker, -1 for none
+        marker_colours : (M, 3) uint8
+        leaves : (U,) the marker that each leaf of the tree is, None if leaf k is marker k
+        """
+        order = np.asarray(order, np.intp)
+        leaves = np.arange(len(order)) if leaves is None else np.asarray(leaves, np.intp)
+        leaf_of = {int(marker): leaf for leaf, marker in enumerate(leaves)}
+        self._matrix, self._labels = np.asarray(matrix, float), list(labels)
+        self._tree = Dendrogram(np.asarray(linkage, float), np.array([leaf_of[int(m)] for m in order], np.intp))
+        self._order = order
+        scale = self.height_scale()
+        self._ends = (scale.low, scale.high)
+        self._image = paint.matrix_image(self._matrix * MM, order, *self._ends) if len(order) else None
+        self.set_clusters(clusters, marker_colours, cut)
+
+    def set_clusters(self, clusters: np.ndarray, marker_colours: np.ndarray, cut: float | None = None) -> None:
+        """Show other groups, (M,) and (M, 3), and the cut that made them; the matrix stays as it is."""
+        self._clusters, self._colours = np.asarray(clusters, np.intp), np.asarray(marker_colours, np.uint8)
+        if cut is not None and not self._dragging:
+            self._cut = float(cut)
+        self.update()
+
+    def set_selected(self, markers: Iterable[int], pair: tuple[int, int] | None = None) -> None:
+        """Frame markers, and the cell of a pair."""
+        self._selected, self._pair = frozenset(int(m) for m in markers), pair
+        self.update()
+
+    def cut(self) -> float:
+        """Height of the line, m."""
+        return self._cut
+
+    def groups(self) -> int:
+        """How many groups there are, edits included."""
+        return len(set(self._clusters[self._clusters >= 0].tolist()))
+
+    def image(self) -> QPixmap:
+        """The whole view as a picture."""
+        return self.grab()
+
+    def places(self) -> Places:
+        """Where everything is drawn."""
+        longest = max(self._labels, key=len, default="")
+        return Places.of(self.width(), self.height(), QFontMetricsF(self.font()), longest)
+
+    def height_scale(self) -> Scale:
+        """Heights of the tree, mm, to pixels."""
+        return paint.height_scale(self._tree, self.places().tree)
+
+    def cell(self, i: int, j: int) -> QRectF:
+        """Where the pair of two markers is drawn (row ``i``, column ``j``)."""
+        area, count = self.places().matrix, len(self._tree.order)
+        row, column = (int(np.flatnonzero(self._order == m)[0]) for m in (i, j))
+        wide, tall = area.width() / count, area.height() / count
+        return QRectF(area.left() + column * wide, area.top() + row * tall, wide, tall)
+
+    def sizeHint(self) -> QSize:
+        """Room for some forty markers."""
+        return QSize(560, 640)
+
+    def minimumSizeHint(self) -> QSize:
+        """Small enough for a dock."""
+        line = em(self)
+        return QSize(round(16 * line), round(14 * line))
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw everything; only the matrix was prepared."""
+        painter, look, places = QPainter(self), colours(), self.places()
+        line = QFontMetricsF(self.font()).height()
+        if self._image is None:
+            painter.setPen(colour(look.faint))
+            text = "The markers are not grouped yet: run the stage Segment."
+            flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
+            painter.drawText(QRectF(self.rect()).adjusted(12, 12, -12, -12), int(flags), text)
+            return
+        clusters, inks = self._clusters[self._order], self._colours[self._order]
+        painter.fillRect(places.tree, colour(look.base))
+        painter.setPen(colour(look.faint))
+        box = QRectF(places.tree.left(), 1, places.tree.width(), line)
+        painter.drawText(box, int(Qt.AlignmentFlag.AlignVCenter), "Standard deviation of distance, mm")
+        scale = paint.height_scale(self._tree, places.tree)
+        paint.paint_tree(painter, places.tree, self._tree, scale, clusters, inks)
+        paint.paint_strips(painter, places, inks, clusters)
+        painter.drawImage(places.matrix, self._image)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        painter.setClipRect(places.matrix.adjusted(-2, -2, 2, 2))
+        paint.paint_blocks(painter, places.matrix, clusters)
+        self._paint_selection(painter, places)
+        painter.setClipping(False)
+        paint.paint_labels(painter, places.labels, self._labels, self._selected, self._order)
+        paint.paint_bar(painter, places.bar, *self._ends)
+        groups = self.groups()
+        text = f"{number(self._cut * MM, 0.1)} mm, {groups} group{'s' if groups != 1 else ''}"
+        paint.paint_cut(painter, places.tree, scale, self._cut, text)
+
+    def _paint_selection(self, painter: QPainter, places: Places) -> None:
+        area, count = places.matrix, len(self._order)
+        wide, tall = area.width() / count, area.height() / count
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.setPen(pen(palette.SELECTED, 1.5))
+        for first, last in runs(np.isin(self._order, list(self._selected))):
+            painter.drawRect(QRectF(area.left(), area.top() + first * tall, area.width(), (last - first) * tall))
+            painter.drawRect(QRectF(area.left() + first * wide, area.top(), (last - first) * wide, area.height()))
+        if self._pair is not None and {*self._pair} <= {*self._order.tolist()}:
+            painter.setPen(pen(palette.SELECTED, 3))
+            painter.drawRect(self.cell(*self._pair).adjusted(-1, -1, 1, 1))
+
+    # what lies below the pointer
+
+    def _column(self, x: float) -> int:
+        area = self.places().matrix
+        return int(np.clip((x - area.left()) / area.width() * len(self._order), 0, len(self._order) - 1))
+
+    def _row(self, y: float) -> int:
+        area = self.places().matrix
+        return int(np.clip((y - area.top()) / area.height() * len(self._order), 0, len(self._order) - 1))
+
+    def _on_cut(self, at: QPointF) -> bool:
+        area = self.places().tree
+        y = min(max(self.height_scale().at(max(self._cut * MM, 1e-9)), area.top()), area.bottom())
+        return abs(at.y() - y) <= _REACH and area.left() - 2 <= at.x() <= area.right() + _REACH
+
+    def _branch_at(self, at: QPointF) -> np.ndarray:
+        """Markers below the lowest bracket whose lines are near a point."""
+        area, scale, brackets = self.places().tree, self.height_scale(), self._tree.brackets
+        x = area.left() + brackets[:, [0, 2]] * area.width() / len(self._order)
+        y = scale.pixel(np.maximum(brackets[:, [1, 3, 4]] * MM, scale.low))
+        flat = (x[:, 0] - 4 <= at.x()) & (at.x() <= x[:, 1] + 4) & (np.abs(y[:, 2] - at.y()) <= 4)
+        left = (np.abs(x[:, 0] - at.x()) <= 4) & (y[:, 2] <= at.y()) & (at.y() <= y[:, 0])
+        right = (np.abs(x[:, 1] - at.x()) <= 4) & (y[:, 2] <= at.y()) & (at.y() <= y[:, 1])
+        found = np.flatnonzero(flat | left | right)
+        if not len(found):
+            return np.zeros(0, np.intp)
+        join = int(found[np.argmin(brackets[found, 4])])
+        first, last = self._tree.spans[len(self._order) + join]
+        return self._order[first:last]
+
+    def _markers_at(self, at: QPointF) -> list[int]:
+        places = self.places()
+        if self._image is None:
+            return []
+        for area, index in ((places.strip, self._column(at.x())), (places.side, self._row(at.y()))):
+            if area.adjusted(-2, -2, 2, 2).contains(at):
+                group = self._clusters[self._order[index]]
+                return np.flatnonzero(self._clusters == group).tolist() if group >= 0 else [int(self._order[index])]
+        if places.labels.contains(at):
+            return [int(self._order[self._row(at.y())])]
+        if places.tree.contains(at):
+            return [int(m) for m in self._branch_at(at)]
+        if places.matrix.contains(at):
+            return sorted({int(self._order[self._row(at.y())]), int(self._order[self._column(at.x())])})
+        return []
+
+    # what the user does
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Grab the cut, or choose what lies there."""
+        at = event.position()
+        if event.button() != Qt.MouseButton.LeftButton or self._image is None:
+            return
+        if self._on_cut(at):
+            self._dragging = True
+        elif self.places().matrix.contains(at) and (i := self._row(at.y())) != (j := self._column(at.x())):
+            self.pair_clicked.emit(int(self._order[i]), int(self._order[j]))
+        elif markers := self._markers_at(at):
+            self.leaves_clicked.emit(markers, event.modifiers())
+        elif self.places().tree.contains(at):
+            self._dragging = True
+            self.mouseMoveEvent(event)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Drag the cut."""
+        if self._dragging:
+            scale, area = self.height_scale(), self.places().tree
+            self._cut = scale.value(min(max(event.position().y(), area.top()), area.bottom())) / MM
+            self.update()
+            self.cut_dragged.emit(self._cut)
+        else:
+            over = self._image is not None and self._on_cut(event.position())
+            self.setCursor(Qt.CursorShape.SizeVerCursor if over else Qt.CursorShape.ArrowCursor)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Let go of it."""
+        if self._dragging:
+            self._dragging = False
+            self.cut_committed.emit(self._cut)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Move the cut by a fiftieth, or go to the next marker."""
+        key = event.key()
+        if self._image is not None and key in (Qt.Key.Key_Up, Qt.Key.Key_Down):
+            self._cut *= 1.02 if key == Qt.Key.Key_Up else 1 / 1.02
+            self.update()
+            self.cut_dragged.emit(self._cut)
+            self.cut_committed.emit(self._cut)
+        elif self._image is not None and key in (Qt.Key.Key_Left, Qt.Key.Key_Right):
+            chosen = np.flatnonzero(np.isin(self._order, list(self._selected)))
+            step = 1 if key == Qt.Key.Key_Right else -1
+            at = (int(chosen[0] if step < 0 else chosen[-1]) + step) % len(self._order) if len(chosen) else 0
+            self.leaves_clicked.emit([int(self._order[at])], event.modifiers())
+        else:
+            super().keyPressEvent(event)
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        """Offer the edits, for what is selected if the pointer is on it (or the menu key was used)."""
+        markers = sorted(self._selected)
+        if event.reason() == QContextMenuEvent.Reason.Mouse:
+            below = self._markers_at(QPointF(event.pos()))
+            markers = markers if set(below) <= self._selected else below
+        if markers:
+            menu = self.menu_for(markers)
+            menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+            menu.popup(event.globalPos())
+
+    def menu_for(self, markers: list[int]) -> QMenu:
+        """What can be done with these markers."""
+        menu = QMenu(self)
+        groups = sorted({int(g) for g in self._clusters[markers] if g >= 0})
+        names = ", ".join(self._labels[m] for m in markers[:4]) + (" …" if len(markers) > 4 else "")
+        menu.addSection(names)
+
+        def add(kind: str, text: str, enabled: bool) -> None:
+            action = menu.addAction(icon(kind), text, lambda: self.edit_requested.emit(kind, markers, -1))
+            action.setEnabled(enabled)
+
+        add("merge", "Merge their groups", len(groups) > 1)
+        add("split", "Split off as a group of their own", bool(groups))
+        moves = menu.addMenu(icon("move"), "Move to group")
+        for group in sorted({int(g) for g in self._clusters if g >= 0} - (set(groups) if len(groups) == 1 else set())):
+            members = np.flatnonzero(self._clusters == group)
+            text = f"{group + 1}: {', '.join(self._labels[m] for m in members[:3])}{' …' if len(members) > 3 else ''}"
+            swatch = QPixmap(16, 16)
+            swatch.fill(colour(self._colours[members[0]]))
+            moves.addAction(QIcon(swatch), text, lambda g=group: self.edit_requested.emit("move", markers, g))
+        add("leave_out", "Leave out", True)
+        return menu
+
+    def event(self, event: QEvent) -> bool:
+        """Say what lies below the pointer."""
+        if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
+            QToolTip.showText(event.globalPos(), self._tip(QPointF(event.pos())), self)
+            return True
+        return super().event(event)
+
+    def _tip(self, at: QPointF) -> str:
+        if self._image is None:
+            return ""
+        if self.places().matrix.contains(at):
+            i, j = int(self._order[self._row(at.y())]), int(self._order[self._column(at.x())])
+            if i == j:
+                return f"{self._labels[i]}, {_group(self._clusters[i])}"
+            value = self._matrix[i, j] * MM
+            known = f"{number(value)} mm" if np.isfinite(value) else "never seen together"
+            return f"{self._labels[i]} and {self._labels[j]}: standard deviation of distance {known}"
+        if self._on_cut(at):
+            return "Drag up for fewer groups, down for more: branches that join below the line are one group."
+        markers = self._markers_at(at)
+        if not markers:
+            return "The higher two branches join, the less rigidly their markers move together."
+        names = ", ".join(self._labels[m] for m in markers[:12]) + (" …" if len(markers) > 12 else "")
+        return f"{names} ({_group(self._clusters[markers[0]])})" if len(markers) == 1 else f"{len(markers)}: {names}"
+
+
+def _group(cluster: int) -> str:
+    return f"group {cluster + 1}" if cluster >= 0 else "left out"
