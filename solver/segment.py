@@ -6,7 +6,7 @@ average linkage cuts the tree at a threshold. Lost markers are left out of the s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -126,6 +126,35 @@ def segment(markers: Markers, settings: SegmentSettings | None = None, progress:
         cut=cut,
         clusters=edited(clusters, settings, leaves[order]),
     )
+
+
+def cut_at(found: Segmentation, settings: SegmentSettings, height: float) -> np.ndarray:
+    """(M,) groups that the same tree has when it is cut at ``height`` m, hand edits made again.
+
+    Parameters
+    ----------
+    settings : that ``found`` was made with; only the edits in them count
+    """
+    order = np.searchsorted(found.leaves, found.order)
+    flat, _ = _cut(found.linkage, order, replace(settings, threshold=height, groups=None))
+    clusters = np.full(len(found.clusters), -1)
+    clusters[found.leaves] = flat
+    return edited(clusters, settings, found.order)
+
+
+def regroup(found: Segmentation, settings: SegmentSettings) -> Segmentation:
+    """The same tree cut anew, with other hand edits: what ``segment`` would find, without looking at the markers.
+
+    Parameters
+    ----------
+    settings : may differ from those of ``found`` in ``threshold``, ``groups`` and the hand edits alone
+    """
+    check_settings(settings, len(found.clusters))
+    rank = {int(m): i for i, m in enumerate(found.leaves)}
+    flat, cut = _cut(found.linkage, np.array([rank[int(m)] for m in found.order]), settings)
+    clusters = np.full(len(found.clusters), -1)
+    clusters[found.leaves] = flat
+    return replace(found, cut=cut, clusters=edited(clusters, settings, found.order))
 
 
 def check_settings(settings: SegmentSettings, markers: int) -> None:

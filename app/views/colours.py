@@ -53,8 +53,8 @@ def by_cluster(clusters: np.ndarray) -> Coloured:
     Groups are counted from 1 on screen.
     """
     count = int(clusters.max(initial=-1)) + 1
-    names = tuple(f"Cluster {i + 1}" for i in range(count))
-    return _by_kind(clusters, palette.categorical(count), names, "Cluster", "no cluster")
+    names = tuple(f"Group {i + 1}" for i in range(count))
+    return _by_kind(clusters, palette.categorical(count), names, "Group of markers", "no group")
 
 
 def by_bone(marker_joint: np.ndarray) -> Coloured:

@@ -78,7 +78,8 @@ def tracks_of(markers: Markers, motion: FittedMotion | None = None, measured: Ma
     if markers.filled is not None:
         state[markers.filled & present] = FILLED
     if measured is not None:
-        state[measured.present & (state != MEASURED)] = OUTLIER
+        was = measured.present if measured.filled is None else measured.present & ~measured.filled
+        state[was & (state != MEASURED)] = OUTLIER
     return MarkerTracks(markers, state, None if motion is None else motion.placed)
 
 

@@ -30,6 +30,8 @@ def test_states_tell_measured_filled_taken_out_and_lost() -> None:
     state = tracks_of(markers, measured=Markers(raw, 10.0, ("a", "b"))).state
     assert state[:, 0].tolist() == [MEASURED, FILLED, LOST, MEASURED]
     assert state[:, 1].tolist() == [OUTLIER, MEASURED, MEASURED, OUTLIER]
+    of_the_file = Markers(cleaned, 10.0, ("a", "b"), filled=filled)
+    assert tracks_of(markers, measured=of_the_file).state[:, 1].tolist() == [LOST, MEASURED, MEASURED, FILLED]
     assert tracks_of(markers).state[:, 1].tolist() == [LOST, MEASURED, MEASURED, FILLED]
 
 
@@ -88,11 +90,11 @@ def test_cluster_colours_and_their_legend() -> None:
     assert np.array_equal(found.colours[0], found.colours[3])
     assert np.array_equal(found.colours[2], palette.LOST)
     texts = [text for text, _ in found.legend.entries]
-    assert texts == ["Cluster 1 (1)", "Cluster 2 (2)", "no cluster (1)"]
+    assert texts == ["Group 1 (1)", "Group 2 (2)", "no group (1)"]
     for text, colour in found.legend.entries[:2]:
-        member = {"Cluster 1 (1)": 1, "Cluster 2 (2)": 0}[text]
+        member = {"Group 1 (1)": 1, "Group 2 (2)": 0}[text]
         assert tuple(found.colours[member]) == colour
-    assert by_cluster(np.full(3, -1)).legend.entries == (("no cluster (3)", palette.LOST),)
+    assert by_cluster(np.full(3, -1)).legend.entries == (("no group (3)", palette.LOST),)
 
 
 def test_a_bone_keeps_its_colour_whatever_else_is_there() -> None:
