@@ -13,8 +13,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn, get_args
 
-from app.cli_commands import SERVICES, Services, run_bench, run_demo, run_evaluate, run_solve
+from app.cli_commands import SERVICES, Services, run_bench, run_demo, run_evaluate, run_solve, run_synth
 from app.cli_endings import CANCELLED, REFUSED, ended
+from app.cli_synth import synth_options
 from solver import __version__
 from solver.bench.request import OUT, names
 from solver.pipeline.request import Convention, Method, Units, Up, parse_range
@@ -24,6 +25,7 @@ COMMANDS = {
     "solve": "from markers and a video to a body, named markers and joint angles",
     "evaluate": "how far a result is from another one or from a reference",
     "bench": "how good the methods are on synthetic sessions whose truth is known",
+    "synth": "make a session whose truth is known, as files",
 }
 
 
@@ -92,6 +94,11 @@ def _parser() -> argparse.ArgumentParser:
     _bench_options(bench)
     _common(bench)
     bench.set_defaults(run=run_bench)
+
+    synth = commands.add_parser("synth", help=COMMANDS["synth"], description=_sentence("synth"))
+    synth_options(synth)
+    _common(synth)
+    synth.set_defaults(run=run_synth)
     return parser
 
 

@@ -8,10 +8,11 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from app.cli_output import Terminal
+from app.cli_synth import synth_settings
 from resources import resource
 from solver.bench.request import BenchRequest
 from solver.errors import InputError
-from solver.pipeline.request import EvaluateRequest, Outcome, SolveOutcome, SolveRequest, check_inputs
+from solver.pipeline.request import EvaluateRequest, Outcome, SolveOutcome, SolveRequest, SynthRequest, check_inputs
 from solver.progress import Progress
 
 DEMO_MARKERS, DEMO_VIDEO = resource("demo", "session.c3d"), resource("demo", "video.mp4")
@@ -42,6 +43,12 @@ def _bench(request: BenchRequest, progress: Progress) -> Outcome:
     return run_bench(request, progress)
 
 
+def _synth(request: SynthRequest, progress: Progress) -> Outcome:
+    from solver.synth.command import make_session
+
+    return make_session(request, progress)
+
+
 @dataclass(frozen=True)
 class Services:
     """The solver's functions that the commands call, loaded when they are needed."""
@@ -50,6 +57,7 @@ class Services:
     evaluate: Callable[[EvaluateRequest, Progress], Outcome] = _evaluate
     judge_demo: Callable[[Path, Progress], Outcome] = _judge_demo
     bench: Callable[[BenchRequest, Progress], Outcome] = _bench
+    synth: Callable[[SynthRequest, Progress], Outcome] = _synth
 
 
 SERVICES = Services()
@@ -94,6 +102,21 @@ def run_bench(options: argparse.Namespace, services: Services) -> int:
     request = BenchRequest(**{name: value for name, value in given.items() if value is not None})
     with Terminal(options) as terminal:
         terminal.show(services.bench(request, terminal.progress))
+    return 0
+
+
+def run_synth(options: argparse.Namespace, services: Services) -> int:
+    """``markerscope synth``."""
+    request = SynthRequest(
+        motion=options.motion,
+        out=options.out,
+        seed=options.seed,
+        skeleton=options.skeleton,
+        motion_rate=options.motion_rate,
+        settings=synth_settings(options),
+    )
+    with Terminal(options) as terminal:
+        terminal.show(services.synth(request, terminal.progress))
     return 0
 
 

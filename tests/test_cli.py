@@ -239,7 +239,7 @@ def test_a_folder_that_cannot_be_written_is_said_before_the_work(markers: Path, 
 def test_version_and_help(capsys) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"markerscope {__version__}\n"
-    for words in (["--help"], ["solve", "--help"], ["demo", "--help"], ["evaluate", "--help"], ["bench", "--help"]):
+    for words in (["--help"], ["solve", "--help"], ["demo", "--help"], ["evaluate", "--help"], ["bench", "--help"], ["synth", "--help"]):
         assert main(words) == 0
         assert "--help" in capsys.readouterr().out
 
@@ -247,7 +247,7 @@ def test_version_and_help(capsys) -> None:
 def test_the_manual_describes_exactly_the_options_there_are(capsys) -> None:
     manual = (Path(__file__).parents[1] / "docs" / "command-line.md").read_text(encoding="utf-8")
     options = set()
-    for words in (["solve", "--help"], ["demo", "--help"], ["evaluate", "--help"], ["bench", "--help"], ["--help"]):
+    for words in (["solve", "--help"], ["demo", "--help"], ["evaluate", "--help"], ["bench", "--help"], ["synth", "--help"], ["--help"]):
         main(words)
         options |= set(re.findall(r"--[a-z][a-z-]+", capsys.readouterr().out))
     assert options == set(re.findall(r"(?<!\w)--[a-z][a-z-]+", manual))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import typing
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
 
@@ -97,6 +97,28 @@ class EvaluateRequest:
     body: Path | None = None
 
 
+@dataclass(frozen=True)
+class SynthRequest:
+    """One synthetic session.
+
+    Attributes
+    ----------
+    motion : a motion file, or the name of one of the program's own motions
+    out : folder for the files
+    seed : of every random choice
+    skeleton : the ASF of an AMC, where it is not the one beside it
+    motion_rate : Hz, frame rate of an AMC
+    settings : fields of ``SynthSettings`` that are not to have their defaults
+    """
+
+    motion: str
+    out: Path
+    seed: int = 0
+    skeleton: Path | None = None
+    motion_rate: float | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
     """What a command found.
@@ -122,10 +144,10 @@ class SolveOutcome(Outcome):
 
 def check_inputs(request: SolveRequest | EvaluateRequest) -> None:
     """Refuse files that are not there before any work is done."""
-    for field in fields(request):
-        path = getattr(request, field.name)
-        if isinstance(path, Path) and field.name != "out" and not path.exists():
-            named = f" ({option(field.name)})" if field.default is None else ""
+    for one in fields(request):
+        path = getattr(request, one.name)
+        if isinstance(path, Path) and one.name != "out" and not path.exists():
+            named = f" ({option(one.name)})" if one.default is None else ""
             raise InputError(f"there is no such file{named}", path, "check the name and the folder")
 
 
