@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from solver.affinity import affinity, bridged
 from solver.errors import InputError
 from solver.markers import Markers
-from solver.segment import Segmentation, SegmentSettings, segment
+from solver.segment import Segmentation, SegmentSettings, regroup, segment
 
 SIZES = (4, 3, 5, 6)
 
@@ -296,3 +296,18 @@ def test_real_markers_fall_into_their_bones(shared_data: Path, far: float, least
     feet = [i for i, bone in enumerate(bones) if bone.endswith("foot")]
     apart = len({(bones[i], found.clusters[i]) for i in feet}) == len({found.clusters[i] for i in feet})
     assert apart == (far > 0), "planted feet are told apart by the distance between them alone"
+
+
+@given(st.floats(0.0, 0.05), st.one_of(st.none(), st.integers(1, 12)), st.lists(st.integers(0, 9), max_size=4))
+def test_cutting_a_tree_anew_finds_what_grouping_anew_does(threshold, groups, chosen) -> None:
+    rng = np.random.default_rng(3)
+    positions = rng.normal(size=(60, 1, 3)) + 0.3 * rng.normal(size=(1, 10, 3)) + 0.01 * rng.normal(size=(60, 10, 3))
+    positions[:, 4] = np.nan
+    markers = Markers(positions, 100.0, tuple("abcdefghij"))
+    first = segment(markers)
+    again = SegmentSettings(
+        threshold=threshold, groups=groups, merges=(tuple(chosen),), splits=((0, 1),), left_out=tuple(chosen[:1])
+    )
+    anew, cut = segment(markers, again), regroup(first, again)
+    assert np.array_equal(anew.clusters, cut.clusters)
+    assert anew.cut == cut.cut

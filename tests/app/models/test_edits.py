@@ -1,0 +1,208 @@
+"""Decisions as functions: what each changes, what it says, and that groups come out as the user made them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as tried
+from hypothesis import strategies as st
+
+from app.models import edits, group_edits
+from solver.errors import InputError
+from solver.markers import Markers
+from solver.pipeline.methods import graph_of
+from solver.pipeline.session import Session, load_session, save_session
+from solver.segment import Segmentation, regroup, segment
+
+EMPTY = Session(Path("/nowhere"))
+LABELS = tuple("abcdefgh")
+
+
+def stage(session: Session, name: str):
+    return session.stage_settings(graph_of(session))[name]
+
+
+def test_a_setting_goes_to_the_settings_and_a_decision_to_the_edits() -> None:
+    edit = edits.set_value(EMPTY, "orient", "offset_mm", 12.0)
+    assert edit.sentence == "Orientation: offset 12 mm, was 9.5 mm"
+    assert (edit.session.settings, edit.session.edits) == ({"orient": {"offset_mm": 12.0}}, {})
+    edit = edits.set_value(EMPTY, "segment", "threshold", 6.5)
+    assert (edit.session.settings, edit.session.edits) == ({}, {"segment": {"threshold": 0.0065}})
+    assert stage(edit.session, "segment").threshold == 0.0065
+
+
+def test_none_can_be_decided_over_a_value_and_taken_back() -> None:
+    given_offset = replace(EMPTY, settings={"sync": {"offset": 0.5}})
+    found = edits.find_offset(given_offset).session
+    assert stage(found, "sync").offset is None
+    set_again = edits.set_offset(found, 0.25).session
+    assert stage(set_again, "sync").offset == 0.25
+    assert stage(edits.reset_value(set_again, "sync", "offset").session, "sync").offset is None
+    assert stage(edits.take_back(found, "sync").session, "sync").offset == 0.5
+
+
+def test_offset_and_pin_leave_no_trace_when_taken_back() -> None:
+    assert edits.find_offset(edits.set_offset(EMPTY, 1.0).session).session == EMPTY
+    assert edits.unpin_candidate(edits.pin_candidate(EMPTY, 1).session).session == EMPTY
+
+
+def test_sentences_count_from_one_and_name_units() -> None:
+    assert edits.pin_candidate(EMPTY, 1).sentence == "Candidate 2 pinned"
+    assert edits.set_offset(EMPTY, 0.37).sentence == "Offset of the video +0.370 s"
+    assert edits.set_range(EMPTY, 2.0, None).sentence == "Solve from 2.00 s to the end"
+    assert edits.set_range(EMPTY, None, None).sentence == "Solve the whole recording"
+    assert group_edits.cut_at(EMPTY, 0.0123).sentence == "Groups cut at 12.3 mm"
+
+
+def test_a_range_may_be_open_at_either_end() -> None:
+    session = edits.set_range(edits.set_range(EMPTY, 1.0, 2.0).session, None, 3.0).session
+    assert (stage(session, "markers").start, stage(session, "markers").stop) == (None, 3.0)
+
+
+def test_a_value_that_cannot_be_is_refused_in_one_sentence() -> None:
+    with pytest.raises(InputError, match="refine"):
+        stage(edits.set_value(EMPTY, "orient", "refine", 0).session, "orient")
+    with pytest.raises(InputError, match="seed"):
+        edits.set_seed(EMPTY, -1)
+
+
+def test_inputs_are_files_that_are_there(tmp_path: Path) -> None:
+    video = tmp_path / "film.mp4"
+    with pytest.raises(InputError, match="there is no such video"):
+        edits.set_input(EMPTY, "video_file", video)
+    with pytest.raises(InputError, match="is a folder"):
+        edits.set_input(EMPTY, "video_file", tmp_path)
+    video.touch()
+    edit = edits.set_input(EMPTY, "video_file", video)
+    assert (edit.sentence, edit.session.inputs["video_file"].path) == ("Video film.mp4", video)
+    assert edits.set_input(edit.session, "video_file", None).session == EMPTY
+    with pytest.raises(InputError, match="cannot be without one"):
+        edits.set_input(EMPTY, "marker_file", None)
+
+
+def test_another_method_keeps_what_it_shares() -> None:
+    session = edits.set_offset(edits.pin_candidate(EMPTY, 1).session, 0.3).session
+    other = edits.set_method(session, "paper").session
+    assert other.run.method == "paper"
+    assert stage(other, "sync").offset == 0.3
+    assert stage(other, "fit").candidate is None
+
+
+def test_restoring_gives_settings_and_decisions_back() -> None:
+    before = edits.set_offset(edits.set_value(EMPTY, "localize", "keep", 5).session, 0.3).session
+    wanted = {name: stage(before, name) for name in ("sync", "localize")}
+    later = edits.find_offset(edits.set_value(before, "localize", "keep", 9).session).session
+    again = edits.restore(later, wanted, "bundle", "back").session
+    assert {name: stage(again, name) for name in wanted} == wanted
+    assert again.edits == {"sync": {"offset": 0.3}}
+
+
+@pytest.fixture(scope="module")
+def found() -> Segmentation:
+    return grouping()
+
+
+@cache
+def grouping() -> Segmentation:
+    """Eight markers on three rigid bodies, one never seen."""
+    rng = np.random.default_rng(1)
+    owner = np.array([0, 0, 0, 1, 1, 1, 2, 2])
+    paths = np.cumsum(0.02 * rng.normal(size=(200, 3, 3)), axis=0) + rng.normal(size=(3, 3)) * 0.2
+    positions = paths[:, owner] + 0.02 * rng.normal(size=(8, 3)) + 0.001 * rng.normal(size=(200, 8, 3))
+    positions[:, 7] = np.nan
+    return segment(Markers(positions, 100.0, LABELS))
+
+
+def partition(groups: np.ndarray) -> set[frozenset[int]]:
+    return {frozenset(np.flatnonzero(groups == k).tolist()) for k in set(groups.tolist()) - {-1}}
+
+
+def shown(session: Session, found: Segmentation) -> Segmentation:
+    return regroup(found, stage(session, "segment"))
+
+
+def test_the_made_up_bodies_are_found(found: Segmentation) -> None:
+    assert partition(found.clusters) == {frozenset({0, 1, 2}), frozenset({3, 4, 5}), frozenset({6})}
+
+
+def test_group_edits_say_which_markers(found: Segmentation) -> None:
+    edit = group_edits.merge(EMPTY, found, {0, 1, 2, 3}, LABELS)
+    assert edit.sentence == "Groups of a, b and 2 more merged"
+    assert stage(edit.session, "segment").merges == ((0, 1, 2, 3),)
+    assert group_edits.move(EMPTY, found, [2], 4, LABELS).sentence == "c moved to the group of e"
+    assert group_edits.leave_out(EMPTY, found, [2, 4], LABELS).sentence == "c and e left out"
+
+
+@pytest.mark.parametrize(
+    ("do", "said"),
+    [
+        (lambda f: group_edits.merge(EMPTY, f, [0, 1], LABELS), "of one group already"),
+        (lambda f: group_edits.split(EMPTY, f, [0, 1, 2], LABELS), "of their own already"),
+        (lambda f: group_edits.split(EMPTY, f, [7], LABELS), "in no group"),
+        (lambda f: group_edits.move(EMPTY, f, [0], 1, LABELS), "in that group already"),
+        (lambda f: group_edits.move(EMPTY, f, [0], 7, LABELS), "h is in no group"),
+        (lambda f: group_edits.take_in(EMPTY, [0], LABELS), "not left out"),
+    ],
+)
+def test_what_would_change_nothing_is_said(found: Segmentation, do, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        do(found)
+
+
+one = st.integers(0, 7)
+some = st.lists(one, min_size=1, max_size=4, unique=True)
+actions = st.one_of(
+    st.tuples(st.just("merge"), some),
+    st.tuples(st.just("split"), some),
+    st.tuples(st.just("move"), some, one),
+    st.tuples(st.just("leave_out"), some),
+)
+
+
+@tried(max_examples=60)
+@given(st.lists(actions, max_size=8))
+def test_any_sequence_of_edits_makes_the_groups_it_says(sequence: list[tuple]) -> None:
+    found = grouping()
+    session, wanted = EMPTY, partition(found.clusters)
+    for kind, markers, *host in sequence:
+        try:
+            edit = getattr(group_edits, kind)(session, shown(session, found), markers, *host, LABELS)
+        except InputError:
+            continue
+        chosen = {m for m in markers if any(m in group for group in wanted)}
+        if kind == "merge":
+            touched = {group for group in wanted if group & chosen}
+            wanted = (wanted - touched) | {frozenset().union(*touched)}
+        else:
+            rest = {group - chosen for group in wanted}
+            (home,) = [group for group in wanted if host and host[0] in group] or [frozenset()]
+            if kind == "split":
+                rest.add(frozenset(chosen))
+            elif kind == "move":
+                rest = (rest - {home - chosen}) | {home | chosen}
+            wanted = rest - {frozenset()}
+        session = edit.session
+        assert partition(shown(session, found).clusters) == wanted, (kind, markers, host)
+
+
+def test_what_was_left_out_comes_back_where_it_was(found: Segmentation) -> None:
+    out = group_edits.leave_out(EMPTY, found, [1, 4], LABELS).session
+    assert shown(out, found).clusters[[1, 4]].tolist() == [-1, -1]
+    back = group_edits.take_in(out, [1], LABELS)
+    assert back.sentence == "b taken in again"
+    assert shown(back.session, found).clusters[4] == -1
+    assert partition(shown(group_edits.undo_all(out).session, found).clusters) == partition(found.clusters)
+
+
+def test_hand_edits_survive_the_session_file(found: Segmentation, tmp_path: Path) -> None:
+    session = group_edits.move(replace(EMPTY, folder=tmp_path), found, [0], 4, LABELS).session
+    session = group_edits.cut_into(edits.set_range(session, 1.0, None).session, 2).session
+    save_session(session)
+    again = load_session(tmp_path)
+    assert again.stage_settings(graph_of(again)) == session.stage_settings(graph_of(session))
+    assert again.edits == session.edits
