@@ -1,4 +1,4 @@
-"""A body motion from a file: a result's ``motion.npz`` or any npz in AMASS layout."""
+"""A body motion from a file: a result's ``motion.npz``, an npz in AMASS layout, a MoSh++ or SOMA result."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from solver.body.skeleton import JOINTS
 from solver.errors import InputError
+from solver.io.motion_layouts import as_amass
 from solver.io.priors.track import numbers, rotations_from_vectors
 from solver.io.safe_pickle import load_untrusted
 
@@ -45,7 +46,7 @@ class MotionFile:
 
 
 def read_motion(path: str | Path) -> MotionFile:
-    """Read a result (its folder or its ``motion.npz``) or an npz in AMASS layout.
+    """Read a result (its folder or its ``motion.npz``), an npz in AMASS layout, or a ``*_stageii.pkl`` of MoSh++.
 
     Raises
     ------
@@ -59,6 +60,7 @@ def read_motion(path: str | Path) -> MotionFile:
         path = path / MOTION
     where = str(path)
     data = load_untrusted(path)
+    data = as_amass(data) if isinstance(data, dict) else data
     if not isinstance(data, dict) or not {"poses", "trans"} <= set(data):
         raise InputError("it is not a motion: it lacks 'poses' or 'trans'", where, _REMEDY)
     poses = numbers(data["poses"], "poses", where)
