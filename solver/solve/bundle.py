@@ -135,7 +135,7 @@ def descend(
                 break
             gain = (cost - trial_cost) / cost
             state, cost, damping = trial, trial_cost, max(damping * 0.3, 1e-6)
-            if phase.free_placement:
+            if weights.free_placement:
                 state, surface = reattach(problem.body, state)
                 cost = problem.energies(state, weights, surface).total
             trace.append(cost)
@@ -152,7 +152,7 @@ def phase_weights(base: Weights, phase: Phase) -> Weights:
         marker_kernel=phase.kernel,
         prior_deg=base.prior_deg * phase.prior,
         root_deg=base.root_deg * phase.prior,
-        free_placement=phase.free_placement,
+        free_placement=base.free_placement and phase.free_placement,
         free_shape=base.free_shape and phase.free_shape,
     )
 
