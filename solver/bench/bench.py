@@ -15,8 +15,8 @@ from solver.bench.cold import cold_seconds
 from solver.bench.execute import Run, with_key
 from solver.bench.keys import key_of
 from solver.bench.machine import machine
-from solver.bench.methods import method_named
 from solver.bench.motions import MotionSource, find_motions
+from solver.bench.registry import method_named, with_ablations
 from solver.bench.request import BenchRequest
 from solver.bench.runner import plain, run_all
 from solver.bench.table import bins_of, markdown_of, rows_of
@@ -25,8 +25,7 @@ from solver.parallel import cores
 from solver.pipeline.request import Outcome
 from solver.progress import Progress, part_of, silent
 
-_METHODS: dict[str, tuple[str, ...]] = {"scaling": ("bundle",)}
-_STEPWISE = ("ablation",)
+_METHODS = ("bundle",)
 FILES = ("bench.md", "bench.json")
 
 
@@ -38,9 +37,11 @@ def run_bench(request: BenchRequest, progress: Progress = silent) -> Outcome:
     InputError : a suite, case, method or folder that there is not, or a folder that cannot be written
     """
     cases = cases_of(request.suite, request.cases, request.frames or FRAMES, request.gaps)
-    methods = request.methods or _METHODS.get(request.suite, ("bundle",))
+    methods = request.methods or _METHODS
     for name in methods:
         method_named(name)
+    if request.suite == "ablation":
+        methods = with_ablations(methods)
     motions = find_motions(request.motions, request.motion_count)
     make_folder(request.out)
     runs = runs_of(request, cases, methods, motions)
@@ -80,7 +81,6 @@ def runs_of(
             seed,
             request.iterations,
             request.limit,
-            stepwise=request.suite in _STEPWISE,
         )
         for seed in range(request.seeds)
         for motion in motions

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from solver.bench.execute import Run, given_of
-from solver.bench.methods import Given, Labels, method_named
+from solver.bench.methods import Given, Labels
+from solver.bench.registry import method_named
 from solver.errors import MarkerscopeError
 from solver.markers import Markers
 from solver.prior import PosePrior

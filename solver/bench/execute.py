@@ -16,8 +16,9 @@ from typing import Any
 
 from solver.bench.cases import Case
 from solver.bench.measure import measure, steps
-from solver.bench.methods import Given, Labels, Variant, method_named
+from solver.bench.methods import Given, Labels, Variant
 from solver.bench.motions import MotionSource, find_motions, read_source
+from solver.bench.registry import method_named
 from solver.errors import MarkerscopeError
 from solver.progress import Progress
 from solver.synth.session import SynthSession, SynthSettings, synthesise
@@ -37,7 +38,6 @@ class Run:
     method : name of the method
     iterations : cap of its optimisations, None for its own
     limit : s that it may take, None for any time
-    stepwise : measure the answer after earlier steps of the method, too
     """
 
     key: str
@@ -47,7 +47,6 @@ class Run:
     seed: int
     iterations: int | None = None
     limit: float | None = None
-    stepwise: bool = False
 
     @property
     def variant(self) -> Variant:
@@ -95,9 +94,7 @@ def _measured(run: Run) -> dict[str, Any]:
         warm, cpu = time.perf_counter() - start, time.process_time() - cpu
     memory = peak_memory()
     found = measure(session, solved) | {"warm_s": warm, "cpu_s": cpu, "memory_gb": memory}
-    if run.stepwise:
-        found["steps"] = dict(steps(session, solved))
-    return found
+    return found | {"steps": dict(steps(session, solved))}
 
 
 def given_of(session: SynthSession, variant: Variant) -> Given:

@@ -30,7 +30,6 @@ def key_of(run: Run) -> str:
             "settings": {name: [type(own).__name__, canonical(own)] for name, own in variant.settings.items()},
             "code": code_digest((*variant.sources, *_GENERATOR)),
             "limit": run.limit,
-            "stepwise": run.stepwise,
         }
     )
 

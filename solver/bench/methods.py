@@ -21,14 +21,16 @@ from solver.pipeline.methods import GRAPHS
 from solver.pipeline.request import Method
 from solver.prior import PosePrior
 from solver.progress import Progress, silent
+from solver.solve.paper.results import PaperSolve
+from solver.solve.paper.settings import PaperLocalizeSettings, PaperSolveSettings
 from solver.solve.results import FittedMotion, Orientation
 
 _UNSURE = 0.5
 """Below this confidence in the offset a solve asks its user for it."""
-_SHARED = ("body", "markers.py", "prior.py", "prior_fill.py", "rotations.py", "sync.py", "video/shadow.py",
+SHARED_CODE = ("body", "markers.py", "prior.py", "prior_fill.py", "rotations.py", "sync.py", "video/shadow.py",
            "video/lift.py", "segment.py", "affinity.py", "localize.py", "solve/*.py", "pipeline/fitting.py",
            "pipeline/stages.py", "pipeline/inputs.py")  # fmt: skip
-_PAPER = (*_SHARED, "solve/paper", "pipeline/stages_paper.py")
+PAPER_CODE = (*SHARED_CODE, "solve/paper", "pipeline/stages_paper.py")
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ class Variant:
     about: str
     solve: Solve
     settings: Mapping[str, Any] = field(default_factory=dict)
-    sources: tuple[str, ...] = _SHARED
+    sources: tuple[str, ...] = SHARED_CODE
     needs_labels: bool = False
 
     def capped(self, iterations: int | None) -> Variant:
@@ -135,20 +137,12 @@ class Variant:
 
 def bundle(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
     """What ``solve`` does with a prior and no video."""
-    return _solved("bundle", *_run("bundle", given, settings, "fit", progress))
+    return outcome("bundle", *run_stages("bundle", given, settings, "fit", progress))
 
 
 def paper(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
     """The published method."""
-    results, seconds = _run("paper", given, settings, "fit", progress)
-    solved = results["solve"]
-    best = solved.yaws[solved.chosen]
-    stages = {"stage 2": best.pose, "stage 4": best.markers, "stage 5": solved.refined}
-    info = {
-        "iterations": {name: stage.descent.iterations for name, stage in stages.items()},
-        "converged": {name: stage.descent.converged for name, stage in stages.items()},
-    }
-    return _solved("paper", results, seconds, info)
+    return outcome("paper", *run_stages("paper", given, settings, "fit", progress))
 
 
 def registration(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
@@ -156,7 +150,7 @@ def registration(given: Given, settings: Mapping[str, Any], progress: Progress =
     from solver.pipeline.fitting import scene
     from solver.solve.registration import register
 
-    results, seconds = _run("paper", given, settings, "localize", progress)
+    results, seconds = run_stages("paper", given, settings, "localize", progress)
     start = time.perf_counter()
     body, seen, points = scene(results)
     motion = register(
@@ -165,7 +159,21 @@ def registration(given: Given, settings: Mapping[str, Any], progress: Progress =
     return Solved(motion, body, results["sync"].offset, {**seconds, "fit": time.perf_counter() - start})
 
 
-def _run(
+def labelled(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
+    """A fit that is told the vertex below every marker, as MoSh++ is; it looks at no video."""
+    from solver.body.bones import with_bone_lengths
+    from solver.solve.labelled.solve import solve_labelled
+
+    if given.labels is None:
+        raise ValueError("a labelled method needs labels")
+    start = time.perf_counter()
+    body = with_bone_lengths(Body.load(given.body))
+    known = {label: int(v) for label, v in zip(given.markers.labels, given.labels.vertex, strict=True) if v >= 0}
+    motion = solve_labelled(body, given.markers, known, settings.get("labelled"), progress)
+    return Solved(motion, body, float("nan"), {"fit": time.perf_counter() - start})
+
+
+def run_stages(
     name: Method, given: Given, settings: Mapping[str, Any], wanted: str, progress: Progress
 ) -> tuple[dict[str, Any], dict[str, float]]:
     """The results and times, s, of all stages of a method's graph that lead to ``wanted``: the very ones of a solve."""
@@ -208,9 +216,8 @@ def _clock(run: Callable[..., Any], inputs: Mapping[str, Any], nominal: float) -
     return run(inputs, SyncSettings(offset=nominal), silent)
 
 
-def _solved(
-    name: Method, results: Mapping[str, Any], seconds: Mapping[str, float], info: Mapping[str, Any] | None = None
-) -> Solved:
+def outcome(name: Method, results: Mapping[str, Any], seconds: Mapping[str, float]) -> Solved:
+    """The answer of a method whose stages have all run."""
     from solver.pipeline.fitting import scene
 
     ranked: Orientation = results["orient"]
@@ -227,38 +234,42 @@ def _solved(
         "margin": ranked.margin if np.isfinite(ranked.margin) else None,
         "sync_confidence": sync.confidence,
         "sync_method": sync.method,
-        **(info or {}),
+        **(_iterations(results["solve"]) if name == "paper" else {}),
     }
     return Solved(motion, body, sync.offset, dict(seconds), told, tuple(alternatives))
 
 
-def _variants() -> tuple[Variant, ...]:
-    from solver.solve.paper.settings import PaperLocalizeSettings, PaperSolveSettings
-
-    published = {"localize": PaperLocalizeSettings(), "solve": PaperSolveSettings()}
-    return (
-        Variant("bundle", "the default method, as solve runs it", bundle),
-        Variant("paper", "Milef et al. (2024), five stages", paper, published, _PAPER),
-        Variant(
-            "registration",
-            "the video's pose set rigidly on the markers (HMR2.0+RR of the paper)",
-            registration,
-            {"localize": PaperLocalizeSettings()},
-            _PAPER,
-        ),
-    )
+def _iterations(solved: PaperSolve) -> dict[str, Any]:
+    best = solved.yaws[solved.chosen]
+    stages = {"stage 2": best.pose, "stage 4": best.markers, "stage 5": solved.refined}
+    return {
+        "iterations": {name: stage.descent.iterations for name, stage in stages.items()},
+        "converged": {name: stage.descent.converged for name, stage in stages.items()},
+    }
 
 
-METHODS: dict[str, Variant] = {variant.name: variant for variant in _variants()}
-
-
-def method_named(name: str) -> Variant:
-    """The method of that name.
-
-    Raises
-    ------
-    InputError : there is none
-    """
-    if name not in METHODS:
-        raise InputError(f'there is no method "{name}"', "--methods", f"use some of: {', '.join(METHODS)}")
-    return METHODS[name]
+METHODS = (
+    Variant("bundle", "the default method, as solve runs it", bundle),
+    Variant(
+        "paper",
+        "Milef et al. (2024), five stages",
+        paper,
+        {"localize": PaperLocalizeSettings(), "solve": PaperSolveSettings()},
+        PAPER_CODE,
+    ),
+    Variant(
+        "registration",
+        "the video's pose set rigidly on the markers (HMR2.0+RR of the paper)",
+        registration,
+        {"localize": PaperLocalizeSettings()},
+        PAPER_CODE,
+    ),
+    Variant(
+        "labelled",
+        "told the vertex below every marker: two stages as in MoSh++, without the video",
+        labelled,
+        sources=(*SHARED_CODE, "solve/labelled"),
+        needs_labels=True,
+    ),
+)
+"""What a user would choose among; ``ablations`` are beside them."""

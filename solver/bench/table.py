@@ -143,7 +143,7 @@ def bins_of(records: Sequence[Record]) -> tuple[Bin, ...]:
     for method in dict.fromkeys(record["method"] for record in records):
         done = [r for r in records if r["method"] == method and r["status"] == "done"]
         for low, high, name in BINS:
-            inside = [r for r in done if low <= r["confidence"] < high]
+            inside = [r for r in done if r["confidence"] is not None and low <= r["confidence"] < high]
             if inside:
                 right, named = (sum(bool(r[key]) for r in inside) for key in ("right", "named"))
                 found.append(Bin(method, name, len(inside), right, named))

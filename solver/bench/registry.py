@@ -1,0 +1,28 @@
+"""Every method that can be named."""
+
+from __future__ import annotations
+
+from solver.bench.ablations import ablations
+from solver.bench.methods import METHODS, Variant
+from solver.errors import InputError
+
+VARIANTS: dict[str, Variant] = {variant.name: variant for variant in (*METHODS, *ablations())}
+
+
+def method_named(name: str) -> Variant:
+    """The method of that name.
+
+    Raises
+    ------
+    InputError : there is none
+    """
+    if name not in VARIANTS:
+        raise InputError(f'there is no method "{name}"', "--methods", f"use some of: {', '.join(VARIANTS)}")
+    return VARIANTS[name]
+
+
+def with_ablations(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Each method followed by those that are named after it."""
+    return tuple(
+        dict.fromkeys(other for name in names for other in VARIANTS if other == name or other.startswith(f"{name}-"))
+    )
