@@ -45,11 +45,13 @@ class Edit:
     sentence : for the history and the undo menu, without a full stop
     session : as it is afterwards
     merge : edits in a row with the same one, if any, are one step of the history (a value being dialled)
+    complete : whether all that stands on what it changes is settled, too (an earlier result is gone back to)
     """
 
     sentence: str
     session: Session
     merge: str = ""
+    complete: bool = False
 
 
 def set_value(session: Session, stage: str, name: str, shown: Any) -> Edit:
@@ -163,7 +165,7 @@ def restore(session: Session, stages: Mapping[str, Any], method: Method, sentenc
         settings[stage] = without(table, by_hand)
         edits[stage] = {name: v for name, v in table.items() if name in by_hand and v != default.get(name)}
     edits = {stage: table for stage, table in edits.items() if table}
-    return Edit(sentence, replace(after, settings=settings, edits=edits))
+    return Edit(sentence, replace(after, settings=settings, edits=edits), complete=True)
 
 
 def existing(path: Path, what: str) -> Path:

@@ -1,0 +1,279 @@
+"""The open session: what was decided, undone and redone, whether it is saved, and how it comes back after a crash."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from app.models.edits import Edit, existing
+from app.models.history import History, Step
+from app.models.home import Home
+from app.models.journal import JOURNAL, VIEW, Writer, journal_of, read_journal, read_view
+from app.models.keep import kept_decisions
+from app.models.signal import Signal
+from solver.errors import InputError
+from solver.io.atomic import cannot_write, make_folder
+from solver.pipeline.methods import graph_of
+from solver.pipeline.session import FILE_NAME, SUFFIX, InputFile, Session, load_session, save_session, session_folder
+
+
+class Document:
+    """At most one open session.
+
+    Parameters
+    ----------
+    home : the user's folders
+
+    Attributes
+    ----------
+    changed : emitted when the session is another or has changed (a decision, undo, redo), with whether it is another
+    saved : emitted when ``dirty``, ``folder`` or the list of recent sessions may have changed
+    view : how the window looked when the session was last open, by part of the window
+    recovered : whether decisions came back that a crash had kept from being saved
+    """
+
+    def __init__(self, home: Home) -> None:
+        self.home = home
+        self.changed: Signal[[bool]] = Signal()
+        self.saved: Signal[[]] = Signal()
+        self.view: dict[str, Any] = {}
+        self.recovered = False
+        self._history: History | None = None
+        self._on_disk: Session | None = None
+        self._writer = Writer()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is a session."""
+        return self._history is not None
+
+    @property
+    def history(self) -> History:
+        """What was decided; only while a session is open."""
+        if self._history is None:
+            raise InputError("no session is open", remedy="open one first")
+        return self._history
+
+    @property
+    def session(self) -> Session:
+        """The open session as it is now."""
+        return self.history.session
+
+    @property
+    def folder(self) -> Path:
+        """The open session's folder."""
+        return self.session.folder
+
+    @property
+    def untitled(self) -> bool:
+        """Whether the session has not been saved anywhere yet."""
+        return self.is_open and self.folder.parent == self.home.unsaved
+
+    @property
+    def dirty(self) -> bool:
+        """Whether there is something that has not been saved."""
+        return self.is_open and (self.untitled or self.session != self._on_disk)
+
+    @property
+    def name(self) -> str:
+        """What to call the session."""
+        if not self.is_open:
+            return ""
+        if self.untitled and "marker_file" in self.session.inputs:
+            return self.session.inputs["marker_file"].path.stem
+        return self.folder.name.removesuffix(SUFFIX)
+
+    @property
+    def problem(self) -> str | None:
+        """Why decisions cannot be kept for the case of a crash, if they cannot."""
+        return self._writer.problem
+
+    def new(
+        self, inputs: Mapping[str, Path], settings: Mapping[str, Mapping[str, Any]] | None = None, name: str = ""
+    ) -> None:
+        """Begin a session from files.
+
+        Parameters
+        ----------
+        inputs : files by the name of the graph's source; ``marker_file`` among them
+        settings : how they are read, tables by stage
+        name : what to call its folder, the marker file's name by default
+
+        Raises
+        ------
+        InputError : a file is not there, or a setting cannot be used
+        """
+        files = {name: InputFile(existing(Path(path), name.replace("_", " "))) for name, path in inputs.items()}
+        if "marker_file" not in files:
+            raise InputError("a session begins with one", "the marker file", "choose a C3D, TRC, CSV or TSV file")
+        session = Session(Path(), files, dict(settings or {}))
+        session.stage_settings(graph_of(session))
+        self.close()
+        folder = self.home.new_folder(name or files["marker_file"].path.stem)
+        self._begin(replace(session, folder=folder), f"Session begun from {files['marker_file'].path.name}")
+
+    def open(self, path: Path, although_open: bool = False) -> None:
+        """Open a session from its folder or file, as it was left, be it by a crash.
+
+        Parameters
+        ----------
+        although_open : even if another window seems to have it open
+
+        Raises
+        ------
+        InputError : it cannot be read, or another window has it open
+        """
+        folder = session_folder(path)
+        if folder is None and Path(path).is_dir() and read_journal(Path(path).absolute()) is not None:
+            folder = Path(path).absolute()  # never saved, and left by a crash
+        left = None if folder is None else read_journal(folder)
+        if left is not None and left.alive and not although_open:
+            raise InputError("is open in another window", path, "close it there first")
+        on_disk = load_session(path) if left is None or session_folder(path) is not None else None
+        self.close()
+        if left is None:
+            assert on_disk is not None
+            self._begin(on_disk, "Session opened", on_disk)
+        else:
+            self._begin(left.history.session, "", on_disk, left.history)
+        if not self.untitled:
+            self.home.add_recent(self.folder)
+            self.saved.emit()
+
+    def left_by_crash(self) -> tuple[Path, ...]:
+        """Sessions that were never saved, and whose window did not close as it should."""
+        folders = sorted(self.home.unsaved.glob(f"*{SUFFIX}")) if self.home.unsaved.is_dir() else []
+        return tuple(f for f in folders if (left := read_journal(f)) is not None and not left.alive)
+
+    def apply(self, edit: Edit) -> None:
+        """Carry a decision out.
+
+        Raises
+        ------
+        InputError : the settings that it makes cannot be used; nothing has changed
+        """
+        before = self.session
+        if edit.session == before:
+            return
+        edit.session.stage_settings(graph_of(edit.session))
+        edit = kept_decisions(before, edit)
+        self.history.add(Step(edit.sentence, time.time(), edit.session, edit.merge))
+        self._after_change()
+
+    def undo(self) -> None:
+        """Take the last decision back."""
+        self.go_to(self.history.position - 1)
+
+    def redo(self) -> None:
+        """Decide again what was taken back last."""
+        self.go_to(self.history.position + 1)
+
+    def go_to(self, position: int) -> None:
+        """Have the session as it was after a step of the history."""
+        if self.history.go_to(position):
+            self._after_change()
+
+    def save(self) -> None:
+        """Write the session file.
+
+        Raises
+        ------
+        InputError : the file system refuses, or the session needs ``save_as`` first
+        """
+        if self.untitled:
+            raise InputError("it has no place yet", "the session", "choose a folder for it")
+        save_session(self.session)
+        self._on_disk = self.session
+        self._keep()
+        self.home.add_recent(self.folder)
+        self.saved.emit()
+
+    def save_as(self, folder: Path) -> None:
+        """Give the session another folder, results and all. No worker may be writing into the old one.
+
+        Raises
+        ------
+        InputError : the place is taken by something else, or the file system refuses; the session stays where it was
+        """
+        folder = Path(os.path.abspath(folder))
+        if folder.suffix != SUFFIX and session_folder(folder) is None:
+            folder = folder.with_name(folder.name + SUFFIX)
+        old, untitled = self.folder, self.untitled
+        if folder != old:
+            if folder.is_dir() and session_folder(folder) is None and any(folder.iterdir()):
+                raise InputError("is a folder of other things", folder, "choose another name")
+            _copy_results(old, folder)
+        moved = [replace(step, session=replace(step.session, folder=folder)) for step in self.history.steps]
+        save_session(moved[self.history.position].session)
+        self._writer.write(old / JOURNAL, None)
+        self._writer.flush()
+        self._history = History(moved, self.history.position)
+        if untitled and folder != old:
+            shutil.rmtree(old, ignore_errors=True)
+        self.set_view(**self.view)
+        self.save()
+        self.changed.emit(True)
+
+    def set_view(self, **parts: Any) -> None:
+        """Remember how parts of the window look, plain JSON values by name; written soon."""
+        if self.is_open:
+            self.view = {**self.view, **parts}
+            self._writer.write(self.folder / VIEW, self.view)
+
+    def close(self, keep_untitled: bool = False) -> None:
+        """Close the session; what was not saved is given up.
+
+        Parameters
+        ----------
+        keep_untitled : leave a session that was never saved where it is, to be found again
+        """
+        if self._history is None:
+            return
+        folder, untitled = self.folder, self.untitled
+        if not (untitled and keep_untitled):
+            self._writer.write(folder / JOURNAL, None)
+        self._writer.close()
+        if untitled and not keep_untitled:
+            shutil.rmtree(folder, ignore_errors=True)
+        self._history, self._on_disk, self.view, self.recovered = None, None, {}, False
+        self.changed.emit(True)
+        self.saved.emit()
+
+    def _begin(
+        self, session: Session, sentence: str, on_disk: Session | None = None, history: History | None = None
+    ) -> None:
+        self._history = history or History([Step(sentence, time.time(), session)])
+        self._on_disk = on_disk
+        self.recovered = history is not None and session != on_disk
+        self.view = read_view(session.folder)
+        self._keep()
+        self.changed.emit(True)
+        self.saved.emit()
+
+    def _after_change(self) -> None:
+        self._keep()
+        self.changed.emit(False)
+        self.saved.emit()
+
+    def _keep(self) -> None:
+        self._writer.write(self.folder / JOURNAL, journal_of(self.history))
+
+
+def _copy_results(old: Path, new: Path) -> None:
+    """Have the results in the new folder too."""
+    make_folder(new)
+    try:
+        if (old / "results").is_dir():
+            ignored = shutil.ignore_patterns(".tmp-*", "outputs.json")
+            shutil.copytree(old / "results", new / "results", dirs_exist_ok=True, ignore=ignored)
+    except (OSError, shutil.Error) as error:
+        if not (new / FILE_NAME).exists():
+            shutil.rmtree(new, ignore_errors=True)
+        if isinstance(error, shutil.Error):
+            raise InputError("cannot be written whole", new, "choose another place") from error
+        raise cannot_write(new, error) from error

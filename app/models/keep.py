@@ -1,0 +1,63 @@
+"""Decisions that stand on something else fall with it, openly: they are taken back by the edit that moved the ground.
+
+The pinned candidate is a row of a ranking, hand-made groups are columns of the marker file. After another ranking, or
+other columns, the same numbers would mean something else, and nobody would see it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from app.models.edits import Edit
+from solver.pipeline.methods import graph_of
+from solver.pipeline.session import Session
+from solver.pipeline.stage import Source, stage_keys
+from solver.pipeline.stages import SOURCES
+
+_BY_COLUMN = ("merges", "splits", "moves", "left_out")
+_COLUMNS = ("subject",)
+"""Settings of the marker file on which its columns depend."""
+
+
+def kept_decisions(before: Session, edit: Edit) -> Edit:
+    """The edit, with the decisions taken back that it makes meaningless, and a sentence that says so."""
+    after, lost = edit.session, []
+    if edit.complete:
+        return edit
+    if _columns(before) != _columns(after) and (table := after.edits.get("segment")):
+        kept = {name: value for name, value in table.items() if name not in _BY_COLUMN}
+        if kept != table:
+            after = _with(after, "segment", kept)
+            lost.append("groups made by hand are as the cut makes them")
+    pinned = before.edits.get("fit", {}).get("candidate")
+    if (
+        pinned is not None
+        and after.edits.get("fit", {}).get("candidate") == pinned
+        and _ranking(before) != _ranking(after)
+    ):
+        after = _with(after, "fit", {name: v for name, v in after.edits["fit"].items() if name != "candidate"})
+        lost.append(f"candidate {pinned + 1} is no longer pinned")
+    if not lost:
+        return edit
+    return replace(edit, session=after, sentence="; ".join((edit.sentence, *lost)))
+
+
+def _columns(session: Session) -> tuple[Any, ...]:
+    file = session.inputs.get("marker_file")
+    table: Mapping[str, Any] = session.settings.get("markers", {})
+    return (None if file is None else file.path, *(table.get(name) for name in _COLUMNS))
+
+
+def _ranking(session: Session) -> str | None:
+    """What the ranking of the candidates depends on, but for what the files hold."""
+    files = {name: file.path.as_posix() for name, file in session.inputs.items()}
+    sources = {name: Source(None, files.get(name, "none")) for name in SOURCES}
+    stages = graph_of(session)
+    return stage_keys(stages, sources, session.stage_settings(stages)).get("orient")
+
+
+def _with(session: Session, stage: str, table: Mapping[str, Any]) -> Session:
+    tables = {name: dict(own) for name, own in {**session.edits, stage: table}.items() if own}
+    return replace(session, edits=tables)
