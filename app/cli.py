@@ -13,7 +13,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn, get_args
 
-from app.cli_commands import SERVICES, Services, run_bench, run_demo, run_evaluate, run_solve, run_synth
+from app.cli_commands import SERVICES, Services, run_bench, run_dataset, run_demo, run_evaluate, run_solve, run_synth
+from app.cli_dataset import dataset_options
 from app.cli_endings import CANCELLED, REFUSED, ended
 from app.cli_synth import synth_options
 from solver import __version__
@@ -26,6 +27,7 @@ COMMANDS = {
     "evaluate": "how far a result is from another one or from a reference",
     "bench": "how good the methods are on synthetic sessions whose truth is known",
     "synth": "make a session whose truth is known, as files",
+    "dataset": "cut your own copy of a public dataset into sessions",
 }
 
 
@@ -99,6 +101,11 @@ def _parser() -> argparse.ArgumentParser:
     synth_options(synth)
     _common(synth)
     synth.set_defaults(run=run_synth)
+
+    dataset = commands.add_parser("dataset", help=COMMANDS["dataset"], description=_sentence("dataset"))
+    dataset_options(dataset)
+    _common(dataset)
+    dataset.set_defaults(run=run_dataset)
     return parser
 
 

@@ -7,10 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
 
+from app.cli_dataset import dataset_request
 from app.cli_output import Terminal
 from app.cli_synth import synth_settings
 from resources import resource
 from solver.bench.request import BenchRequest
+from solver.datasets.request import DatasetRequest
 from solver.errors import InputError
 from solver.pipeline.request import EvaluateRequest, Outcome, SolveOutcome, SolveRequest, SynthRequest, check_inputs
 from solver.progress import Progress
@@ -49,6 +51,12 @@ def _synth(request: SynthRequest, progress: Progress) -> Outcome:
     return make_session(request, progress)
 
 
+def _dataset(request: DatasetRequest, progress: Progress) -> Outcome:
+    from solver.datasets.sessions import write_sessions
+
+    return write_sessions(request, progress)
+
+
 @dataclass(frozen=True)
 class Services:
     """The solver's functions that the commands call, loaded when they are needed."""
@@ -58,6 +66,7 @@ class Services:
     judge_demo: Callable[[Path, Progress], Outcome] = _judge_demo
     bench: Callable[[BenchRequest, Progress], Outcome] = _bench
     synth: Callable[[SynthRequest, Progress], Outcome] = _synth
+    dataset: Callable[[DatasetRequest, Progress], Outcome] = _dataset
 
 
 SERVICES = Services()
@@ -117,6 +126,13 @@ def run_synth(options: argparse.Namespace, services: Services) -> int:
     )
     with Terminal(options) as terminal:
         terminal.show(services.synth(request, terminal.progress))
+    return 0
+
+
+def run_dataset(options: argparse.Namespace, services: Services) -> int:
+    """``markerscope dataset``."""
+    with Terminal(options) as terminal:
+        terminal.show(services.dataset(dataset_request(options), terminal.progress))
     return 0
 
 

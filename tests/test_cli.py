@@ -17,10 +17,11 @@ import numpy as np
 import pytest
 
 from app import cli_commands
-from app.cli import main
+from app.cli import COMMANDS, main
 from app.cli_commands import Services
 from app.cli_output import ProgressBar, json_line
 from solver import __version__
+from solver.datasets.request import DatasetRequest, Options
 from solver.errors import Cancelled, InputError, MarkerscopeError
 from solver.pipeline import output
 from solver.pipeline.request import EvaluateRequest, Outcome, SolveOutcome, SolveRequest
@@ -96,6 +97,31 @@ def test_every_option_reaches_the_solver(markers: Path, tmp_path: Path) -> None:
             body=tmp_path / "body.npz",
             convention="isb",
         )
+    ]
+
+
+def test_every_option_reaches_the_datasets() -> None:
+    asked: list[DatasetRequest] = []
+
+    def cut(request: DatasetRequest, progress: Progress) -> Outcome:
+        asked.append(request)
+        return Outcome(summary={})
+
+    words = "dataset kitchen in --out out --priors p --offsets o.json --parts left_arm right_leg --windows 2 --backpack"
+    assert main(words.split(), replace(Fake().services, dataset=cut)) == 0
+    assert main("dataset moyo in --out out --split train".split(), replace(Fake().services, dataset=cut)) == 0
+    assert asked == [
+        DatasetRequest(
+            "kitchen",
+            Path("in"),
+            Path("out"),
+            parts=("left_arm", "right_leg"),
+            windows=2,
+            priors=Path("p"),
+            offsets=Path("o.json"),
+            options=Options(backpack=True),
+        ),
+        DatasetRequest("moyo", Path("in"), Path("out"), options=Options(split="train")),
     ]
 
 
@@ -239,16 +265,16 @@ def test_a_folder_that_cannot_be_written_is_said_before_the_work(markers: Path, 
 def test_version_and_help(capsys) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"markerscope {__version__}\n"
-    for words in (["--help"], ["solve", "--help"], ["demo", "--help"], ["evaluate", "--help"], ["bench", "--help"], ["synth", "--help"]):
-        assert main(words) == 0
+    for words in ([], *([command] for command in COMMANDS)):
+        assert main([*words, "--help"]) == 0
         assert "--help" in capsys.readouterr().out
 
 
 def test_the_manual_describes_exactly_the_options_there_are(capsys) -> None:
     manual = (Path(__file__).parents[1] / "docs" / "command-line.md").read_text(encoding="utf-8")
     options = set()
-    for words in (["solve", "--help"], ["demo", "--help"], ["evaluate", "--help"], ["bench", "--help"], ["synth", "--help"], ["--help"]):
-        main(words)
+    for words in ([], *([command] for command in COMMANDS)):
+        main([*words, "--help"])
         options |= set(re.findall(r"--[a-z][a-z-]+", capsys.readouterr().out))
     assert options == set(re.findall(r"(?<!\w)--[a-z][a-z-]+", manual))
 

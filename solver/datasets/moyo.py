@@ -7,12 +7,12 @@ from pathlib import Path
 from solver.datasets.recording import (
     Dataset,
     Film,
-    Options,
     Recording,
     files_in,
     not_as_expected,
     side_by_side,
 )
+from solver.datasets.request import Options
 
 CAMERA = "YOGI_Cam_06"
 SESSIONS = ("20220923_20220926_with_hands", "20221004_with_com")

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
+from solver.datasets.request import Options
 from solver.errors import InputError
 
 RATE = 30.0
 """Hz, what Milef et al. (2024) bring every dataset to."""
-DatasetName = Literal["umpm", "kitchen", "moyo"]
 
 
 @dataclass(frozen=True)
@@ -52,20 +51,6 @@ class Recording:
     film: Film | None = None
     reference: Path | None = None
     synchronised: bool = True
-
-
-@dataclass(frozen=True)
-class Options:
-    """What the user chooses.
-
-    Attributes
-    ----------
-    backpack : keep the markers on the backpack (Kitchen)
-    split : train or val (MOYO)
-    """
-
-    backpack: bool = False
-    split: str = "val"
 
 
 @dataclass(frozen=True)

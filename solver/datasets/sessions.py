@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,9 @@ from solver import __version__
 from solver.datasets.film import timing, write_stretch
 from solver.datasets.kitchen import KITCHEN
 from solver.datasets.moyo import MOYO
-from solver.datasets.recording import RATE, Dataset, DatasetName, Options, Recording
+from solver.datasets.recording import RATE, Dataset, Recording
 from solver.datasets.reference import write_reference
+from solver.datasets.request import DatasetName, DatasetRequest, Options
 from solver.datasets.umpm import UMPM
 from solver.datasets.windows import cut, from_zero, starts
 from solver.errors import InputError
@@ -32,31 +33,6 @@ _PRIORS = (".pkl", ".pt", ".npy", ".npz")
 _AROUND_S = 5.0
 """What is shown of the video on either side of a window whose offset is not known."""
 _FEWEST = 3
-
-
-@dataclass(frozen=True)
-class DatasetRequest:
-    """What is to be made of which dataset.
-
-    Attributes
-    ----------
-    dataset, folder : which, and the user's copy of it
-    out : folder for the sessions
-    parts : parts of the body to make sessions of; none: the whole body
-    windows : of each recording at most
-    priors : folder of poses by another program, named after the recordings; used instead of the videos
-    offsets : JSON file, recording -> s, marker time less video time, where they were not started together
-    options : what the dataset leaves to the user
-    """
-
-    dataset: DatasetName
-    folder: Path
-    out: Path
-    parts: tuple[str, ...] = ()
-    windows: int | None = None
-    priors: Path | None = None
-    offsets: Path | None = None
-    options: Options = field(default_factory=Options)
 
 
 def write_sessions(request: DatasetRequest, progress: Progress = silent) -> Outcome:

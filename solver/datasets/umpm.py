@@ -7,13 +7,13 @@ from pathlib import Path
 from solver.datasets.recording import (
     Dataset,
     Film,
-    Options,
     Recording,
     files_in,
     not_as_expected,
     side_by_side,
     subfolders,
 )
+from solver.datasets.request import Options
 
 CAMERA = "l"
 """The left one of front, side, right and left (table 6 of Milef et al. 2024)."""

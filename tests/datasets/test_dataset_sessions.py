@@ -16,8 +16,8 @@ import pytest
 from solver.datasets import sessions
 from solver.datasets.kitchen import BACKPACK, KITCHEN
 from solver.datasets.moyo import MOYO
-from solver.datasets.recording import Options
-from solver.datasets.sessions import DatasetRequest, write_sessions
+from solver.datasets.request import DatasetName, DatasetRequest, Options
+from solver.datasets.sessions import write_sessions
 from solver.datasets.umpm import UMPM
 from solver.errors import InputError
 from solver.io.export_c3d import write_c3d
@@ -307,7 +307,7 @@ def broken_picture(root: Path) -> None:
     ],
 )
 def test_a_folder_that_is_not_as_expected_ends_in_one_sentence(
-    tmp_path: Path, dataset: sessions.DatasetName, make: Callable[[Path], None], message: str
+    tmp_path: Path, dataset: DatasetName, make: Callable[[Path], None], message: str
 ) -> None:
     make(tmp_path / "in")
     with pytest.raises(InputError) as told:
