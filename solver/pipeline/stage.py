@@ -5,14 +5,14 @@ from __future__ import annotations
 import graphlib
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from solver.errors import Cancelled
 from solver.pipeline.digest import DigestCache, canonical, file_digest, result_key
 from solver.pipeline.store import Absent, Store
-from solver.progress import Progress, part_of, silent
+from solver.progress import Found, Progress, part_of, silent, tell
 
 State = Literal["cached", "stale", "not run", "running", "failed"]
 
@@ -160,11 +160,54 @@ def run_graph(
     runner = _Runner({stage.name: stage for stage in graph}, keys, sources, settings, store, progress, on_event)
     wanted = [name for name in keys if until is None or name in until]
     store.clean()
-    runner.plan(wanted)
+    runner.shares = shares(graph, keys, store, wanted)
     for name in wanted:
         runner.ensure(name)
     progress(1.0, "done")
     return GraphRun(keys, runner.events, runner.value)
+
+
+def shares(
+    graph: Sequence[Stage], keys: Mapping[str, str], store: Store, wanted: Collection[str]
+) -> dict[str, tuple[float, float]]:
+    """From where to where each stage that has to run takes the progress bar, in the order they run.
+
+    Parameters
+    ----------
+    keys : of every stage, as ``stage_keys`` gives them
+    wanted : the stages whose results are wanted
+    """
+    stages = {stage.name: stage for stage in graph}
+    missing: set[str] = set()
+    frontier = list(wanted)
+    while frontier:
+        name = frontier.pop()
+        if name not in missing and name in stages and not store.has(name, keys[name]):
+            missing.add(name)
+            frontier += stages[name].inputs
+    total = sum(stages[name].cost for name in missing) or 1.0
+    found: dict[str, tuple[float, float]] = {}
+    done = 0.0
+    for name in keys:
+        if name in missing:
+            found[name] = done / total, (done + stages[name].cost) / total
+            done += stages[name].cost
+    return found
+
+
+@dataclass(frozen=True)
+class _Report:
+    """A stage's progress: what it finds on the way is stamped with its name and key."""
+
+    progress: Progress
+    stage: str
+    key: str
+
+    def __call__(self, fraction: float, text: str) -> None:
+        self.progress(fraction, text)
+
+    def found(self, found: Found) -> None:
+        tell(self.progress, replace(found, stage=self.stage, key=self.key))
 
 
 class _Runner:
@@ -184,23 +227,7 @@ class _Runner:
         self.store, self.progress, self.on_event = store, progress, on_event
         self.events: dict[str, Event] = {}
         self.memory: dict[str, Any] = {}
-        self.shares: dict[str, tuple[float, float]] = {}
-
-    def plan(self, wanted: Sequence[str]) -> None:
-        """Share out the progress bar among the stages that will have to run."""
-        missing: set[str] = set()
-        frontier = list(wanted)
-        while frontier:
-            name = frontier.pop()
-            if name not in missing and name not in self.sources and not self.store.has(name, self.keys[name]):
-                missing.add(name)
-                frontier += self.stages[name].inputs
-        total = sum(self.stages[name].cost for name in missing) or 1.0
-        done = 0.0
-        for name in self.keys:
-            if name in missing:
-                self.shares[name] = (done / total, (done + self.stages[name].cost) / total)
-                done += self.stages[name].cost
+        self.shares: Mapping[str, tuple[float, float]] = {}
 
     def ensure(self, name: str) -> None:
         """Have a stage's result in the store."""
@@ -231,7 +258,7 @@ class _Runner:
         stage, key = self.stages[name], self.keys[name]
         inputs = {i: self.value(i) for i in stage.inputs}
         settings = _settings_of(stage, self.settings)
-        report = part_of(self.progress, *self.shares.get(name, (0.0, 0.0)))
+        report = _Report(part_of(self.progress, *self.shares.get(name, (0.0, 0.0))), name, key)
         self._tell(Event(name, "running", key))
         report(0.0, name)
         start = time.perf_counter()

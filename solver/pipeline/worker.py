@@ -22,6 +22,7 @@ from typing import Any
 from solver.errors import Cancelled, MarkerscopeError
 from solver.pipeline.stage import Event
 from solver.pipeline.store import Store
+from solver.progress import Found
 
 _REPORT_EVERY_S = 0.05
 
@@ -49,7 +50,7 @@ class Failed:
     details: str = ""
 
 
-Message = Progressed | Event | Finished | Failed
+Message = Progressed | Found | Event | Finished | Failed
 
 
 class WorkerDied(MarkerscopeError):
@@ -132,26 +133,40 @@ class Job:
         self._messages.put(Failed(Cancelled("Cancelled.") if self._cancelled else _death(self._process.exitcode)))
 
 
+class _Sender:
+    """A progress that goes to the parent; any thread may report."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._lock = threading.Lock()
+        self._last = 0.0
+
+    def __call__(self, fraction: float, text: str) -> None:
+        now = time.monotonic()
+        if now - self._last >= _REPORT_EVERY_S or fraction >= 1.0:
+            self._last = now
+            self.send(Progressed(fraction, text))
+
+    def found(self, found: Found) -> None:
+        self.send(found)
+
+    def send(self, message: Message) -> None:
+        with self._lock:
+            self._connection.send(message)
+
+
 def _child(sender: Connection, function: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
     """Run the function and send what happens."""
     # Ctrl+C in a terminal reaches the child too; whether to stop is the parent's decision.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    last = 0.0
-
-    def progress(fraction: float, text: str) -> None:
-        nonlocal last
-        now = time.monotonic()
-        if now - last >= _REPORT_EVERY_S or fraction >= 1.0:
-            last = now
-            sender.send(Progressed(fraction, text))
-
+    say = _Sender(sender)
     try:
-        sender.send(Finished(function(*args, progress=progress, on_event=sender.send, **kwargs)))
+        say.send(Finished(function(*args, progress=say, on_event=say.send, **kwargs)))
     except MarkerscopeError as error:
-        sender.send(Failed(error, traceback.format_exc()))
+        say.send(Failed(error, traceback.format_exc()))
     except Exception as error:
         # An arbitrary exception need not survive the journey; what it said does.
-        sender.send(Failed(RuntimeError(f"{type(error).__name__}: {error}"), traceback.format_exc()))
+        say.send(Failed(RuntimeError(f"{type(error).__name__}: {error}"), traceback.format_exc()))
 
 
 def _death(exit_code: int | None) -> WorkerDied:

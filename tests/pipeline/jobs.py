@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from solver.errors import InputError
 from solver.pipeline.stage import Event, NoSettings, Source, Stage, run_graph
 from solver.pipeline.store import Store
+from solver.progress import Found, part_of, tell
 
 
 def add(a: int, b: int, *, progress: Any, on_event: Any) -> int:
@@ -58,3 +60,8 @@ def graph_that_hangs(root: Path, *, progress: Any, on_event: Any) -> None:
     half.mkdir(parents=True)
     (half / "arrays.npz").write_bytes(b"half")
     run_graph(GRAPH, {"file": Source.file(None)}, {}, store, progress=progress, on_event=on_event)
+
+
+def seek(*, progress: Any, on_event: Any) -> None:
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda i: tell(part_of(progress, 0.0, 0.5), Found("chain", i, {"cost": float(i)})), range(40)))

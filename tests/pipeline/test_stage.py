@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from solver.errors import Cancelled, InputError
-from solver.pipeline.stage import Event, NoSettings, Source, Stage, run_graph, stage_keys, stage_states
+from solver.pipeline.stage import Event, NoSettings, Source, Stage, run_graph, shares, stage_keys, stage_states
 from solver.pipeline.store import Store
+from solver.progress import Found, part_of, tell
 
 
 @dataclass(frozen=True)
@@ -184,3 +185,36 @@ def test_wrong_graphs_are_refused(work: Work) -> None:
             stage_keys(graph, work.sources, {})
     with pytest.raises(ValueError, match="typo"):
         stage_keys(work.graph, work.sources, {"typo": Scale()})
+
+
+def test_what_a_stage_finds_on_the_way_arrives_with_its_name_and_key(tmp_path: Path) -> None:
+    heard: list[Found] = []
+
+    class Listener:
+        def __call__(self, fraction: float, text: str) -> None: ...
+
+        def found(self, found: Found) -> None:
+            heard.append(found)
+
+    def run(given: Mapping[str, Any], chosen: Any, progress: Any) -> Numbers:
+        tell(part_of(part_of(progress, 0.0, 0.5), 0.2, 0.4), Found("candidate", 3, {"energy": 1.5}))
+        return Numbers(np.zeros(1))
+
+    stage = Stage("search", 1, NoSettings, (), run, Numbers)
+    done = run_graph([stage], {}, {}, Store(tmp_path), progress=Listener())
+    assert heard == [Found("candidate", 3, {"energy": 1.5}, "search", done.keys["search"])]
+    run_graph([stage], {}, {}, Store(tmp_path / "other"))  # who only hears fractions is not bothered
+
+
+def test_only_what_has_to_run_takes_the_bar(tmp_path: Path) -> None:
+    work = Work(tmp_path)
+    graph = [
+        replace(stage, cost={"read": 1.0, "double": 2.0, "total": 3.0, "join": 4.0}[stage.name]) for stage in work.graph
+    ]
+    keys = stage_keys(graph, work.sources, {})
+    whole = shares(graph, keys, work.store, ["join"])
+    assert list(whole) == [name for name in keys if name in whole]
+    assert {name: 10 * (stop - start) for name, (start, stop) in whole.items()} == pytest.approx(costs)
+    assert shares(graph, keys, work.store, ["double"]).keys() == {"read", "double"}
+    run_graph(graph, work.sources, {}, work.store, until=["double"])
+    assert shares(graph, keys, work.store, ["join"]).keys() == {"total", "join"}

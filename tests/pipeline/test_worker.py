@@ -11,6 +11,7 @@ from solver.errors import Cancelled, InputError
 from solver.pipeline.stage import Event
 from solver.pipeline.store import Store
 from solver.pipeline.worker import Failed, Finished, Job, Progressed, WorkerDied
+from solver.progress import Found
 from tests.pipeline import jobs
 
 
@@ -66,3 +67,8 @@ def test_polling_does_not_wait() -> None:
     while not any(isinstance(message, Finished) for message in seen):
         seen += job.poll()
     assert job.poll() == []
+
+
+def test_what_several_threads_find_arrives_whole() -> None:
+    found = [message for message in Job(jobs.seek).messages() if isinstance(message, Found)]
+    assert sorted(found, key=lambda f: f.index) == [Found("chain", i, {"cost": float(i)}) for i in range(40)]
