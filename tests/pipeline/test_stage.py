@@ -208,9 +208,8 @@ def test_what_a_stage_finds_on_the_way_arrives_with_its_name_and_key(tmp_path: P
 
 def test_only_what_has_to_run_takes_the_bar(tmp_path: Path) -> None:
     work = Work(tmp_path)
-    graph = [
-        replace(stage, cost={"read": 1.0, "double": 2.0, "total": 3.0, "join": 4.0}[stage.name]) for stage in work.graph
-    ]
+    costs = {"read": 1.0, "double": 2.0, "total": 3.0, "join": 4.0}
+    graph = [replace(stage, cost=costs[stage.name]) for stage in work.graph]
     keys = stage_keys(graph, work.sources, {})
     whole = shares(graph, keys, work.store, ["join"])
     assert list(whole) == [name for name in keys if name in whole]
