@@ -1,0 +1,89 @@
+"""All that stands over the picture of a scene, and what it is made from."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QFont, QPainter
+
+from widgets import palette, theme
+from widgets.scene.camera import Camera
+from widgets.scene.layers import LEAST_RADIUS_PX, MARKER_RADIUS
+from widgets.scene.legend import Legend
+from widgets.scene.legend_paint import draw_legend
+from widgets.scene.overlay import Places, Words, draw_axes, draw_band, draw_labels, draw_rings, draw_ticks
+from widgets.scene.stage import Stage
+from widgets.theme import qcolour
+
+_Point = tuple[float, float]
+
+
+class Sheet:
+    """Names, rings and the legend.
+
+    Attributes
+    ----------
+    labels : a name for each marker
+    selected, hovered : the markers with a ring, and the one under the pointer (-1 for none)
+    legend : None for none
+    """
+
+    def __init__(self) -> None:
+        self.labels: list[str] = []
+        self.selected: list[int] = []
+        self.hovered = -1
+        self.legend: Legend | None = None
+        self._words = Words()
+
+    def paint(
+        self,
+        painter: QPainter,
+        stage: Stage,
+        camera: Camera,
+        size: tuple[int, int],
+        band: tuple[_Point, _Point] | None = None,
+    ) -> None:
+        """Paint over a picture of the stage, ``size`` pixels wide and high."""
+        look, (width, height) = theme.colours(), size
+        painter.setRenderHints(QPainter.RenderHint.Antialiasing | QPainter.RenderHint.TextAntialiasing)
+        if stage.problem is not None:
+            painter.setPen(qcolour(look.text))
+            box = QRectF(0, 0, width, height).adjusted(20, 20, -20, -20)
+            painter.drawText(box, int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap), stage.problem)
+            return
+        taken = [QRectF(0, height - 84, 88, 84)] if stage.shows("axes") else []
+        if self.legend is not None and stage.shows("legend"):
+            taken.append(draw_legend(painter, self.legend, width, height, look))
+        places = Places(taken)
+        if stage.shows("markers"):
+            self._markers(painter, stage, camera, size, places)
+        if stage.floor is not None and stage.shows("floor"):
+            draw_ticks(painter, self._words, places, *stage.floor.ticks(camera, width, height), look)
+        if stage.shows("axes"):
+            draw_axes(painter, self._words, camera, QPointF(44, height - 42), look)
+        if band is not None:
+            draw_band(painter, *band, look)
+
+    def _markers(self, painter: QPainter, stage: Stage, camera: Camera, size: tuple[int, int], places: Places) -> None:
+        look, (width, height) = theme.colours(), size
+        pixels, _ = camera.project(stage.markers, width, height)
+        outside = (pixels < 0).any(axis=1) | (pixels[:, 0] > width) | (pixels[:, 1] > height)
+        pixels = np.where(outside[:, None], np.nan, pixels)
+        radius = max(LEAST_RADIUS_PX, MARKER_RADIUS / camera.metres_per_pixel(height))
+        chosen = [i for i in self.selected if i < len(pixels)]
+        draw_rings(painter, pixels[chosen], radius + 3.5, palette.SELECTED, look)
+        hovered = [self.hovered] if 0 <= self.hovered < len(pixels) else []
+        draw_rings(painter, pixels[hovered], radius + 3.5, look.text, look)
+        if not self.labels:
+            return
+        first = hovered + [i for i in chosen if i not in hovered]
+        rest = [i for i in range(len(pixels)) if i not in set(first)] if stage.shows("labels") else []
+        plain, bold = QFont(painter.font()), QFont(painter.font())
+        bold.setBold(True)
+        for which, font in ((first, bold), (rest, plain)):
+            which = [i for i in which if i < len(self.labels)]
+            painter.setFont(font)
+            texts = [self.labels[i] for i in which]
+            ink, outline = qcolour(look.text), qcolour(look.outline, 210)
+            draw_labels(painter, self._words, places, pixels[which], texts, ink, outline, radius + 5)
+        painter.setFont(plain)
