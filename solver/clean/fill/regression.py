@@ -1,0 +1,168 @@
+"""Ridge regression on the neighbours, in a frame that rides with them: the default."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.clean.fill.blend import blend, drift, ends_of, throughout
+from solver.clean.fill.frames import centred, local_frames
+from solver.clean.fill.neighbours import Neighbours, neighbours_of
+from solver.clean.fill.rigid import FEWEST, FLOOR_M, rigid_part
+from solver.clean.fill.spline import spline_part
+from solver.clean.gaps import Fill, Filled, FillSettings, Gap, gaps_to_fill, together
+
+_FEWEST_FRAMES = 30
+"""Frames that a regression needs; with fewer the rigid body is surer."""
+_MOST_FRAMES = 500
+_ROUNDS = 2
+"""Gaps are filled from neighbours that have gaps themselves: each round starts from the last one's filling."""
+_NOISE_M = 0.0015
+"""Noise of a neighbour that is seen: the ridge."""
+_FILLED_M = 0.01
+"""Noise of a neighbour that is filled itself."""
+_FILLED_WEIGHT = 0.3
+"""Weight of a frame for the regression if all neighbours are filled in it."""
+_FOLDS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """The recording as far as it is filled.
+
+    Attributes
+    ----------
+    positions : (T, M, 3) m, the filling of the round before put in
+    present, known : (T, M) where it was measured, and where it is measured or filled
+    """
+
+    positions: np.ndarray
+    present: np.ndarray
+    known: np.ndarray
+    near: Neighbours
+
+
+@dataclass(frozen=True, eq=False)
+class _Local:
+    """A marker among one group of neighbours, in the frame that rides with them.
+
+    Attributes
+    ----------
+    group : (K,) the neighbours
+    frames : (N,) frames of the recording looked at, rising
+    R_lab_local, centre : (N, 3, 3) and (N, 3) m, the frame
+    features : (N, 3K) m, the neighbours in it
+    target : (N, 3) m, the marker in it
+    train : rows from which the relation is learnt
+    weight : of these, sums to 1
+    """
+
+    group: np.ndarray
+    frames: np.ndarray
+    R_lab_local: np.ndarray
+    centre: np.ndarray
+    features: np.ndarray
+    target: np.ndarray
+    train: np.ndarray
+    weight: np.ndarray
+
+
+Parts = dict[Gap, tuple[Fill, np.ndarray]]
+
+
+def fill_regression(positions: np.ndarray, rate: float, settings: FillSettings) -> Filled:
+    """Each gap by the best that the data allow: regression, else a rigid body, else a spline.
+
+    Regression works on neighbours that may be filled themselves, so it is done in rounds, from the rigid filling on.
+    """
+    present = np.isfinite(positions).all(axis=2)
+    near = neighbours_of(positions)
+    gaps = gaps_to_fill(present, rate, settings)
+    parts: Parts = {}
+    for gap in gaps:
+        part = rigid_part(positions, present, near, gap, settings.neighbours) or spline_part(positions, present, gap)
+        if part is not None:
+            parts[gap] = part
+    for _ in range(_ROUNDS):
+        whole = positions.copy()
+        for gap, (_, values) in parts.items():
+            whole[gap.first : gap.last + 1, gap.marker] = values
+        scene = _Scene(whole, present, np.isfinite(whole).all(axis=2), near)
+        parts |= _round(scene, gaps, settings.neighbours)
+    return together(positions, list(parts.values()), settings)
+
+
+def _round(scene: _Scene, gaps: list[Gap], most: int) -> Parts:
+    """Every gap that regression can fill; those with the same neighbours share their learning."""
+    alike = defaultdict(list)
+    for gap in gaps:
+        group = scene.near.nearest(gap.marker, throughout(scene.known, gap), most)
+        alike[gap.marker, tuple(group)].append(gap)
+    found: Parts = {}
+    for (marker, group), members in alike.items():
+        local = _local(scene, marker, np.array(group), members) if len(group) >= FEWEST else None
+        if local is not None:
+            found |= _predicted(scene, local, marker, members)
+    return found
+
+
+def _local(scene: _Scene, marker: int, group: np.ndarray, gaps: list[Gap]) -> _Local | None:
+    """The marker in the frame of its neighbours; None where too few frames show it with them."""
+    complete = np.asarray(scene.known[:, group].all(axis=1))
+    train = np.flatnonzero(complete & scene.present[:, marker])
+    if len(train) < _FEWEST_FRAMES:
+        return None
+    if len(train) > _MOST_FRAMES:
+        train = train[np.linspace(0, len(train) - 1, _MOST_FRAMES).round().astype(np.intp)]
+    needed = np.zeros(len(complete), dtype=bool)
+    needed[train] = True
+    for gap in gaps:
+        needed[max(gap.first - 1, 0) : gap.last + 2] = True
+    frames = np.flatnonzero(needed & complete)
+    rows = np.searchsorted(frames, train)
+    points, seen = scene.positions[frames][:, group], scene.present[frames][:, group]
+    weights = 1 / (scene.near.spread[marker, group] + FLOOR_M) ** 2
+    reference = centred(points[rows[np.argmax(seen[rows].sum(axis=1))]], weights)
+    R_lab_local, centre = local_frames(points, reference, weights)
+    features = ((points - centre[:, None]) @ R_lab_local).reshape(len(frames), -1)
+    target = np.einsum("nji,nj->ni", R_lab_local, scene.positions[frames, marker] - centre)
+    weight = _FILLED_WEIGHT + (1 - _FILLED_WEIGHT) * seen[rows].mean(axis=1) ** 2
+    return _Local(group, frames, R_lab_local, centre, features, target, rows, weight / weight.sum())
+
+
+def _predicted(scene: _Scene, local: _Local, marker: int, gaps: list[Gap]) -> Parts:
+    """The gaps filled, each with the error that the same gap would have had elsewhere."""
+    X, Y = local.features[local.train], local.target[local.train]
+    mean_x, mean_y = local.weight @ X, local.weight @ Y
+    X, Y = X - mean_x, Y - mean_y
+    weighted = X * local.weight[:, None]
+    gram, cross = weighted.T @ X, weighted.T @ Y
+    residual = _held_out(X, Y, local.weight, gram, cross)
+    found: Parts = {}
+    for gap in gaps:
+        span = np.arange(gap.first, gap.last + 1)
+        lost = 1 - scene.present[span][:, local.group].mean(axis=0)
+        # A neighbour that is filled itself is believed less: errors in the variables are what a ridge stands for.
+        ridge = np.repeat(_NOISE_M**2 + (_FILLED_M * lost) ** 2, 3)
+        slope = np.linalg.solve(gram + np.diag(ridge), cross)
+        ends = ends_of(gap, scene.present[:, marker] & scene.known[:, local.group].all(axis=1))
+        rows, at_ends = np.searchsorted(local.frames, span), np.searchsorted(local.frames, ends)
+        guess = (local.features[np.concatenate([rows, at_ends])] - mean_x) @ slope + mean_y
+        inside = guess[: len(span)] + blend(gap, ends, local.target[at_ends] - guess[len(span) :])
+        values = np.einsum("nij,nj->ni", local.R_lab_local[rows], inside) + local.centre[rows]
+        error = drift(local.frames[local.train], residual, gap, len(ends)) * (1 + float(lost.mean()))
+        found[gap] = Fill(marker, gap.first, gap.last, "regression", 0.0, error), values
+    return found
+
+
+def _held_out(X: np.ndarray, Y: np.ndarray, weight: np.ndarray, gram: np.ndarray, cross: np.ndarray) -> np.ndarray:
+    """(N, 3) m, what is left of each row by the regression on the other folds; folds are spans of time."""
+    left = np.empty_like(Y)
+    for fold in np.array_split(np.arange(len(X)), _FOLDS):
+        weighted = X[fold] * weight[fold, None]
+        ridge = _NOISE_M**2 * (1 - weight[fold].sum()) * np.eye(len(gram))
+        slope = np.linalg.solve(gram - weighted.T @ X[fold] + ridge, cross - weighted.T @ Y[fold])
+        left[fold] = Y[fold] - X[fold] @ slope
+    return left
