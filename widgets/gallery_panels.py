@@ -1,0 +1,51 @@
+"""Examples of the cards, bars and lists."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QWidget
+
+from widgets.panels.stage_data import EarlierResult, FieldSpec, StageData, StageProgress
+from widgets.panels.stage_panel import StagePanel
+
+SEGMENT = (
+    FieldSpec(
+        "threshold", "Threshold", "float", 6.5, 8.0, "mm", 0.1, 100.0,
+        help="average standard deviation of distance at which the tree is cut",
+    ),
+    FieldSpec("groups", "Groups", "int", None, None, "", 1, 60, optional=True, help="cut into this many instead"),
+    FieldSpec("far", "Far", "float", 350.0, 350.0, "mm", 0.0, 2000.0, help="pairs further apart are held apart"),
+    FieldSpec("keep", "Keep the measured points", "bool", True, True, help="do not smooth"),
+    FieldSpec("convention", "Convention", "choice", "opensim", "opensim", choices=("opensim", "isb", "plugin-gait")),
+    FieldSpec("span", "Range", "range", (2.0, 14.5), (None, None), "s", 0.0, 60.0, help="part of the recording"),
+)  # fmt: skip
+STAGES = (
+    StageData("markers", "Markers", "cached", 0.03, "41 markers, 60.0 s at 100 Hz, 3.2 % lost"),
+    StageData("clean", "Cleaning", "stale", 1.34, "214 points taken out, 5 gaps filled"),
+    StageData(
+        "segment", "Segmentation", "cached", 0.41, "11 groups of 41 markers at 6.5 mm", SEGMENT,
+        (
+            EarlierResult("a1", "threshold 6.5 mm", "today 14:02", "11 groups", current=True),
+            EarlierResult("b2", "threshold 8 mm", "today 13:48", "9 groups", compared=True),
+        ),
+        help="Groups markers that move rigidly together",
+    ),
+    StageData("orient", "Orientation", "running", None, "", why_not="A run is in progress: stop it first."),
+    StageData(
+        "fit", "Fit", "failed", 3.2,
+        "The fit stopped at marker LANK, frame 112: no group covers the left shank. Merge groups, run again.",
+    ),
+    StageData("angles", "Joint angles"),
+)  # fmt: skip
+
+
+def stages() -> QWidget:
+    """A stage in every state; one is open."""
+    made = StagePanel()
+    made.set_stages(STAGES)
+    made.set_progress("orient", StageProgress(0.42, "candidate 5 of 12", 38.0))
+    made.card("segment").set_open(True)
+    made.resize(max(390, made.minimumSizeHint().width()), 820)
+    return made
+
+
+EXAMPLES = {"stages": stages}

@@ -1,0 +1,238 @@
+"""One stage: how it stands, what it found, what is set, and what it found before under other settings."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtGui import QFont, QPalette
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from widgets.icons import icon
+from widgets.panels.fields import SettingsForm
+from widgets.panels.stage_data import MEANING, EarlierResult, StageData, StageProgress, duration, left
+from widgets.theme import colours
+
+_LOOK = {
+    "not run": ("not_run", "faint"),
+    "cached": ("cached", "good"),
+    "stale": ("stale", "warning"),
+    "running": ("running", "accent"),
+    "failed": ("failed", "error"),
+}
+
+
+class StageCard(QFrame):
+    """A card that opens to its settings and earlier results.
+
+    Signals
+    -------
+    run(name), run_to(name) : this stage alone; this one and all it needs
+    stop() : the run in progress
+    setting_changed(name, field, value)
+    earlier_chosen(name, key) : go back to this result
+    compare_toggled(name, key, on) : show it beside the one in force
+    opened(name, open) : the card was opened or closed
+    """
+
+    run = Signal(str)
+    run_to = Signal(str)
+    stop = Signal()
+    setting_changed = Signal(str, str, object)
+    earlier_chosen = Signal(str, str)
+    compare_toggled = Signal(str, str, bool)
+    opened = Signal(str, bool)
+
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.name = name
+        self.setFrameShape(QFrame.Shape.StyledPanel)
+        self.setAutoFillBackground(True)
+        self.setBackgroundRole(QPalette.ColorRole.AlternateBase)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
+        self._data = StageData(name, name)
+        self._icon, self._title, self._state, self._seconds = QLabel(), QLabel(), QLabel(), QLabel()
+        self._headline = QLabel()
+        self._headline.setWordWrap(True)
+        self._headline.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.toggle = QToolButton()
+        self.toggle.setAutoRaise(True)
+        self.toggle.setCheckable(True)
+        self.toggle.toggled.connect(self._open)
+        self.bar, self._left, self.stop_button = QProgressBar(), QLabel(), QPushButton(icon("stop"), "Stop")
+        self._left.setWordWrap(True)
+        self.stop_button.setToolTip("End the run; what was computed before stays")
+        self.stop_button.clicked.connect(self.stop)
+        self.form = SettingsForm()
+        self.form.changed.connect(lambda field, value: self.setting_changed.emit(self.name, field, value))
+        self.run_button, self.run_to_button = (
+            QPushButton(icon("run"), "Run"),
+            QPushButton(icon("run_to"), "Run to here"),
+        )
+        self.run_button.clicked.connect(lambda: self.run.emit(self.name))
+        self.run_to_button.clicked.connect(lambda: self.run_to.emit(self.name))
+        self._earlier = QVBoxLayout()
+        self._earlier_shown: tuple[EarlierResult, ...] | None = None
+        self._lay_out()
+        self._open(False)
+
+    def _lay_out(self) -> None:
+        bold = QFont(self.font())
+        bold.setBold(True)
+        self._title.setFont(bold)
+        head = QHBoxLayout()
+        head.setSpacing(6)
+        for part in (self._icon, self._title, self._state):
+            head.addWidget(part)
+        head.addStretch(1)
+        head.addWidget(self._seconds)
+        head.addWidget(self.toggle)
+        self._running = QWidget()
+        progress = QVBoxLayout(self._running)
+        progress.setContentsMargins(0, 0, 0, 0)
+        row = QHBoxLayout()
+        row.addWidget(self.bar, 1)
+        row.addWidget(self.stop_button)
+        progress.addLayout(row)
+        progress.addWidget(self._left)
+        self._details = QWidget()
+        details = QVBoxLayout(self._details)
+        details.setContentsMargins(0, 4, 0, 0)
+        details.addWidget(self.form)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.run_button)
+        buttons.addWidget(self.run_to_button)
+        buttons.addStretch(1)
+        details.addLayout(buttons)
+        details.addLayout(self._earlier)
+        outer = QVBoxLayout(self)
+        outer.setContentsMargins(10, 6, 8, 8)
+        outer.setSpacing(4)
+        outer.addLayout(head)
+        outer.addWidget(self._headline)
+        outer.addWidget(self._running)
+        outer.addWidget(self._details)
+        self._running.hide()
+
+    def set_data(self, data: StageData) -> None:
+        """Show how the stage stands."""
+        self._data = data
+        self.setAccessibleName(f"{data.title}: {data.state}")
+        self._title.setText(data.title)
+        self._title.setToolTip(data.help)
+        self._state.setText(data.state)
+        self._state.setToolTip(MEANING[data.state])
+        self._seconds.setText("" if data.seconds is None else duration(data.seconds))
+        self._seconds.setToolTip("How long it took to compute")
+        self._headline.setText(data.headline)
+        self._headline.setVisible(bool(data.headline))
+        self._running.setVisible(data.state == "running")
+        for button, what in ((self.run_button, "this stage"), (self.run_to_button, "all that is missing up to here")):
+            button.setEnabled(not data.why_not)
+            button.setToolTip(data.why_not or f"Compute {what}")
+        self.form.set_fields(data.fields)
+        self.form.setVisible(bool(data.fields))
+        self._show_earlier(data.earlier)
+        self._paint()
+
+    def set_progress(self, progress: StageProgress) -> None:
+        """Show how far it is."""
+        self.bar.setRange(0, 0 if progress.part is None else 1000)
+        if progress.part is not None:
+            self.bar.setValue(round(1000 * progress.part))
+            self.bar.setFormat(f"{100 * progress.part:.0f} %")
+        parts = [progress.text, "" if progress.seconds_left is None else left(progress.seconds_left)]
+        self._left.setText(", ".join(part for part in parts if part))
+        self._left.setVisible(bool(self._left.text()))
+
+    def is_open(self) -> bool:
+        """Whether settings are shown."""
+        return self.toggle.isChecked()
+
+    def set_open(self, on: bool) -> None:
+        """Show or hide settings and earlier results."""
+        self.toggle.setChecked(on)
+
+    def earlier_rows(self) -> list[QWidget]:
+        """The rows of earlier results, below their title."""
+        items = [self._earlier.itemAt(k) for k in range(1, self._earlier.count())]
+        return [row for item in items if item is not None and (row := item.widget()) is not None]
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow another theme or font."""
+        if event.type() in (QEvent.Type.PaletteChange, QEvent.Type.FontChange) and hasattr(self, "_details"):
+            bold = QFont(self.font())
+            bold.setBold(True)
+            self._title.setFont(bold)
+            self._paint()
+        super().changeEvent(event)
+
+    def _open(self, on: bool) -> None:
+        self._details.setVisible(on)
+        self.toggle.setIcon(icon("up" if on else "down"))
+        self.toggle.setToolTip("Hide the settings" if on else "Show the settings and earlier results")
+        self.toggle.setAccessibleName(self.toggle.toolTip())
+        self.opened.emit(self.name, on)
+
+    def _paint(self) -> None:
+        look = colours()
+        glyph, ink = _LOOK[self._data.state]
+        side = self.fontMetrics().height()
+        self._icon.setPixmap(icon(glyph, ink).pixmap(QSize(side, side), self.devicePixelRatioF()))
+        self._state.setStyleSheet(f"color: rgb{getattr(look, ink)}")
+        self._seconds.setStyleSheet(f"color: rgb{look.faint}")
+        self._left.setStyleSheet(f"color: rgb{look.faint}")
+        self._headline.setStyleSheet(f"color: rgb{look.error if self._data.state == 'failed' else look.text}")
+
+    def _show_earlier(self, results: tuple[EarlierResult, ...]) -> None:
+        if results == self._earlier_shown:
+            return
+        self._earlier_shown = results
+        while (item := self._earlier.takeAt(0)) is not None:
+            if (old := item.widget()) is not None:
+                old.deleteLater()
+        if not results:
+            return
+        title = QLabel("Results in store")
+        title.setToolTip("Go back to one at once, or tick those to be shown beside the one in force")
+        self._earlier.addWidget(title)
+        for result in results:
+            self._earlier.addWidget(self._row(result))
+
+    def _row(self, result: EarlierResult) -> QWidget:
+        row = QWidget()
+        layout = QHBoxLayout(row)
+        layout.setContentsMargins(0, 0, 0, 0)
+        compare = QCheckBox()
+        compare.setChecked(result.compared or result.current)
+        compare.setEnabled(not result.current)
+        compare.setToolTip("Show it beside the one in force" if not result.current else "The one in force")
+        compare.setAccessibleName(f"Compare: {result.settings}")
+        compare.toggled.connect(partial(self.compare_toggled.emit, self.name, result.key))
+        text = QLabel(
+            f"{result.settings}\n{', '.join(part for part in (result.headline, result.when) if part)}".strip()
+        )
+        text.setWordWrap(True)
+        use: QWidget
+        if result.current:
+            use = QLabel("in force")
+        else:
+            use = button = QPushButton("Use")
+            button.setAccessibleName(f"Use: {result.settings}")
+            button.setToolTip("Set the stage as it was for this result, which is there at once; can be undone")
+            button.clicked.connect(partial(self.earlier_chosen.emit, self.name, result.key))
+        layout.addWidget(compare, 0, Qt.AlignmentFlag.AlignTop)
+        layout.addWidget(text, 1)
+        layout.addWidget(use, 0, Qt.AlignmentFlag.AlignTop)
+        return row
