@@ -10,6 +10,7 @@ import numpy as np
 from app.views.posing import Detail, Pose, PosedPoints, fixed_points, mesh_of, pose_at, skin_points
 from app.views.seams import Seams, seams_of
 from solver.body.model import Body
+from solver.localize import R_LAB_UPRIGHT_CAMERA
 from solver.markers import Markers
 from solver.prior import PosePrior
 from solver.rotations import exp_so3, slerp
@@ -106,6 +107,11 @@ class BodyTrack:
         """(M, 3) m, where each of ``count`` markers belongs at a time; the skin itself where no more is known."""
         return self._spread((self.placement or self.skin).at(self.pose(time)), count)
 
+    def places_over(self, times: np.ndarray) -> np.ndarray:
+        """(n, U, 3) m, where the markers that have a place belong at several times."""
+        points = self.placement or self.skin
+        return np.stack([points.at(self.pose(float(time))) for time in times])
+
     def _spread(self, points: np.ndarray, count: int) -> np.ndarray:
         out = np.full((count, 3), np.nan)
         out[self.markers] = points
@@ -157,6 +163,19 @@ def of_hypothesis(
     betas = np.zeros(body.shape_count)
     trans = found.trans[row] - body.joints(betas)[0]
     return BodyTrack(body, betas, times, rotations, trans, found.markers, found.vertex[row])
+
+
+def of_chain(
+    body: Body, found: PaperLocalization, row: int, prior: PosePrior, sync: Sync, markers: Markers
+) -> BodyTrack:
+    """One of the chains that were laid over the markers: the whole body that it belongs to."""
+    chain = found.candidates[row]
+    times = markers.time[found.frames]
+    rotations = slerp(prior.rotations, prior.time, (times - sync.offset) / sync.rate_ratio)
+    turn = exp_so3(np.array([0.0, 0.0, np.radians(chain.yaw_deg)])) @ R_LAB_UPRIGHT_CAMERA
+    rotations[:, 0] = turn @ rotations[:, 0]
+    nothing = np.zeros(0, dtype=np.intp)
+    return BodyTrack(body, chain.betas, times, rotations, chain.trans, nothing, nothing)
 
 
 def of_iteration(

@@ -72,7 +72,7 @@ def by_residual(residual: np.ndarray, limit: float = RESIDUAL_LIMIT_M) -> Colour
 def by_state(state: np.ndarray) -> Coloured:
     """By what there is of each marker (M,) in this frame: see ``tracks``."""
     entries = tuple(
-        (f"{STATE_NAMES[kind]} ({number})", _rgb(_STATE_COLOURS[kind]))
+        (f"{STATE_NAMES[kind]} ({number})", rgb(_STATE_COLOURS[kind]))
         for kind in (MEASURED, FILLED, OUTLIER, LOST)
         if (number := int((state == kind).sum())) or kind == MEASURED
     )
@@ -97,9 +97,10 @@ def _by_kind(kind: np.ndarray, colours: np.ndarray, names: tuple[str, ...], titl
     """Colours of kinds (M,), -1 for none, with those that occur in the legend."""
     table = np.concatenate([colours, np.array([palette.LOST], dtype=np.uint8)])
     number = np.bincount(np.where(kind < 0, len(names), kind), minlength=len(names) + 1)
-    entries = tuple((f"{name} ({number[i]})", _rgb(table[i])) for i, name in enumerate((*names, none)) if number[i])
+    entries = tuple((f"{name} ({number[i]})", rgb(table[i])) for i, name in enumerate((*names, none)) if number[i])
     return Coloured(table[kind], Legend(title, entries))
 
 
-def _rgb(colour: np.ndarray) -> RGB:
+def rgb(colour: np.ndarray) -> RGB:
+    """A colour (3,) as plain numbers."""
     return (int(colour[0]), int(colour[1]), int(colour[2]))

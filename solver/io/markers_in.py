@@ -52,14 +52,26 @@ def load_markers(
     ------
     InputError : the file cannot be read or does not say enough
     """
+    return settled(read_raw(path), path, up=up, units=units, subject=subject, rate=rate)
+
+
+@np.errstate(all="ignore")
+def settled(
+    raw: RawMarkers,
+    path: str | Path,
+    *,
+    up: UpAxis | None = None,
+    units: str | None = None,
+    subject: str | None = None,
+    rate: float | None = None,
+) -> Markers:
+    """What a file holds, as metres with z up: ``load_markers`` of a file that was read before."""
     if up is not None and up not in ("x", "y", "z"):
         raise InputError(f"{up!r} is not a vertical axis", "up", "say x, y or z")
     if rate is not None and not (np.isfinite(rate) and rate > 0):
         raise InputError(f"{rate!r} is not a frame rate", "rate", "give it in Hz, for instance 100")
-    raw = _markers_only(_one_subject(_read(path), subject, path), path)
-    positions = _lost_as_nan(raw.positions)
-    if positions.shape[0] == 0:
-        raise InputError("has no frames", path, "export the marker trajectories again")
+    raw = markers_of(raw, subject, path)
+    positions = raw.positions
     rate, rate_notes = _settle_rate(raw.rate, rate, path)
     factor, unit_notes = settle_units(positions, raw.units, units, str(path))
     metres = positions * factor
@@ -81,14 +93,24 @@ def load_markers(
     )
 
 
+@np.errstate(all="ignore")
+def markers_of(raw: RawMarkers, subject: str | None, path: str | Path) -> RawMarkers:
+    """The markers of one subject (of the one with most data where none is named), without what is no marker."""
+    raw = _markers_only(_one_subject(raw, subject, path), path)
+    if raw.positions.shape[0] == 0:
+        raise InputError("has no frames", path, "export the marker trajectories again")
+    return replace(raw, positions=_lost_as_nan(raw.positions))
+
+
 def list_subjects(path: str | Path) -> tuple[str, ...]:
     """Subjects in the file that ``load_markers`` can tell apart, in the file's order; empty where it names none."""
-    raw = _read(path)
+    raw = read_raw(path)
     return subjects_of(raw.labels, raw.subjects)
 
 
 @np.errstate(all="ignore")
-def _read(path: str | Path) -> RawMarkers:
+def read_raw(path: str | Path) -> RawMarkers:
+    """What a file holds, as it stands there: before units, axes, rate and subject are settled."""
     data = read_bytes(path)
     suffix = Path(path).suffix.lower()
     if (suffix == ".c3d" and b"\0" in data[:512]) or looks_like_c3d(data):

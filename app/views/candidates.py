@@ -1,0 +1,264 @@
+"""Where the markers may sit: every way that was thought of, and how far each one got."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from app.views.colours import bone_name
+from solver.body.skeleton import subtrees
+from solver.solve.confidence import same_answer
+from solver.solve.method import part_name
+from solver.solve.paper.results import PaperLocalization
+from solver.solve.results import Localization, Orientation
+
+Fate = Literal["found", "too alike", "kept", "left behind", "merged", "scored", "refined"]
+"""How far a way got: see ``FATES``."""
+
+FATES: dict[Fate, str] = {
+    "found": "laid over the markers, not yet relaxed",
+    "too alike": "left out: it shares nearly all its bones with one that was kept",
+    "kept": "not yet laid over the markers",
+    "left behind": "relaxed on a few keyframes, then others were better",
+    "merged": "ran into a better one while it was refined",
+    "scored": "laid over the markers, then others were better",
+    "refined": "refined to the end",
+}
+
+
+@dataclass(frozen=True)
+class CandidateRow:
+    """One way to put the markers on the body.
+
+    Attributes
+    ----------
+    pool : its row in the localization: a hypothesis, or a chain; -1 for an answer that has none of its own
+    candidate : its row in the orientation, by which it is pinned; -1 if it is not there
+    fate : how far it got
+    part : the bones that carry markers, in words
+    bones : their names, from the pelvis outwards
+    yaw_deg : degrees, the yaw it was started from, or ended at where the method fits it; NaN if it has none
+    heading_deg : degrees, which way the camera looks about the vertical; NaN if unknown
+    distance : mm, root mean square from the markers to the body before any pose is changed; NaN if not laid over
+    score : what it is ranked by, see ``CandidateTable.score``; NaN if not scored
+    margin : score over the best one of the same fate, 1 for that; NaN if not scored
+    covered : share 0..1 of the markers that are near the body, see ``coverage``; NaN where nobody asked
+    same_as_first : whether it is the first candidate's answer found once more
+    in_use : whether the fit goes on from it
+    """
+
+    pool: int
+    candidate: int
+    fate: Fate
+    part: str
+    bones: tuple[str, ...]
+    yaw_deg: float = float("nan")
+    heading_deg: float = float("nan")
+    distance: float = float("nan")
+    score: float = float("nan")
+    margin: float = float("nan")
+    covered: float = float("nan")
+    same_as_first: bool = False
+    in_use: bool = False
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of the selection: its name, what happened there, and the rows that are in it."""
+
+    name: str
+    help: str
+    rows: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class CandidateTable:
+    """All rows, the steps that narrow them down, and what the score is.
+
+    Attributes
+    ----------
+    rows : best first
+    steps : from the pool to the refined
+    score, unit : what the candidates are ranked by
+    """
+
+    rows: tuple[CandidateRow, ...]
+    steps: tuple[Step, ...]
+    score: str
+    unit: str
+
+
+def candidate_table(
+    found: Localization | PaperLocalization,
+    ranked: Orientation | None = None,
+    in_use: int | None = None,
+    covered: dict[int, float] | None = None,
+) -> CandidateTable:
+    """The candidates as far as they are known.
+
+    Parameters
+    ----------
+    found : where the search stands
+    ranked : the orientation, once it is there
+    in_use : row of the candidate that the fit goes on from
+    covered : share of the markers covered, by row of the orientation
+    """
+    if isinstance(found, PaperLocalization):
+        rows, steps = _of_chains(found, ranked)
+        score, unit = "two-way Chamfer distance; yaws: one-way", "mm²"
+    else:
+        rows, steps = _of_hypotheses(found, ranked)
+        score, unit = "energy per frame", ""
+    covered = covered or {}
+    marked = tuple(
+        replace(row, in_use=row.candidate == in_use, covered=covered.get(row.candidate, float("nan")))
+        if row.candidate >= 0
+        else row
+        for row in rows
+    )
+    return CandidateTable(marked, steps, score, unit)
+
+
+def coverage(points: np.ndarray, markers: np.ndarray, within: float = 0.03) -> float:
+    """Share 0..1 of the markers that are near their places in at least half of the frames that show them.
+
+    Parameters
+    ----------
+    points : (N, U, 3) m, where each marker belongs
+    markers : (N, U, 3) m, NaN = lost
+    within : m
+    """
+    distance = np.linalg.norm(points - markers, axis=2)
+    seen = np.isfinite(distance).sum(axis=0)
+    near = (np.nan_to_num(distance, nan=np.inf) <= within).sum(axis=0)
+    return float((near[seen > 0] >= 0.5 * seen[seen > 0]).mean()) if (seen > 0).any() else float("nan")
+
+
+def bone_names(bones: Sequence[int] | np.ndarray) -> tuple[str, ...]:
+    """Names of the bones that occur, from the pelvis outwards."""
+    return tuple(bone_name(int(j)) for j in np.unique(bones) if j >= 0)
+
+
+def _of_hypotheses(
+    found: Localization, ranked: Orientation | None
+) -> tuple[tuple[CandidateRow, ...], tuple[Step, ...]]:
+    place = {} if ranked is None else {c.hypothesis: i for i, c in enumerate(ranked.candidates)}
+    rows = []
+    for h in range(len(found.start)):
+        view = found.R_lab_cam[h, :, 2]
+        row = CandidateRow(
+            pool=h,
+            candidate=place.get(h, -1),
+            fate="found" if ranked is None else "merged",
+            part=part_name(found.bone[h]),
+            bones=bone_names(found.bone[h]),
+            yaw_deg=float(found.yaw_deg[h]),
+            heading_deg=float(np.degrees(np.arctan2(view[1], view[0]))),
+            distance=float(found.cost_mm[h]),
+        )
+        rows.append(row if ranked is None or h not in place else _relaxed(row, ranked))
+    if ranked is not None:
+        rows.sort(key=lambda row: row.candidate if row.candidate >= 0 else len(rows))
+    relaxed = [i for i, row in enumerate(rows) if row.fate != "found"]
+    refined = [i for i in relaxed if rows[i].fate in ("refined", "merged")]
+    ends = [i for i in refined if rows[i].fate == "refined"]
+    steps = (
+        Step("Pool", "Ways to put the markers on the video's body, found without changing its pose.", _all(rows)),
+        Step("Scored", "Relaxed on a few keyframes, markers on whole vertices.", tuple(relaxed)),
+        Step("Kept", "The best, no more than two alike: relaxed on all keyframes, markers free.", tuple(refined)),
+        Step("Refined", "What did not run into a better one, to the end.", tuple(ends)),
+    )
+    return tuple(rows), steps
+
+
+def _relaxed(row: CandidateRow, ranked: Orientation) -> CandidateRow:
+    """The row of a candidate as the orientation has it."""
+    own = ranked.candidates[row.candidate]
+    best = next(c for c in ranked.candidates if c.refined == own.refined)
+    return replace(
+        row,
+        fate="refined" if own.refined else "left behind",
+        part=own.part,
+        bones=bone_names(own.bone),
+        heading_deg=own.heading_deg,
+        score=own.energy,
+        margin=own.energy / max(best.energy, 1e-12),
+        same_as_first=row.candidate > 0 and own.refined and same_answer(ranked.candidates[0], own),
+    )
+
+
+def _of_chains(
+    found: PaperLocalization, ranked: Orientation | None
+) -> tuple[tuple[CandidateRow, ...], tuple[Step, ...]]:
+    answers = _yaws(ranked)
+    chains = _chains(found, ranked)
+    rows = (*answers, *chains)
+    first = len(answers)
+    pool = tuple(range(first, len(rows)))
+    kept = tuple(i for i in pool if rows[i].fate != "too alike")
+    scored = tuple(i for i in kept if rows[i].fate == "scored")
+    size = found.pruned.shape[1] if found.pruned.ndim == 2 and len(found.pruned) else found.groups
+    steps = (
+        Step("Pool", f"All connected chains of {size} bones, one for each group of markers.", pool),
+        Step("Pruned", "Less those that nearly repeat another.", kept),
+        Step("Scored", _said_scored(found), scored),
+        Step("Refined", "Every yaw solved in five stages.", tuple(range(first))),
+    )
+    return rows, steps
+
+
+def _said_scored(found: PaperLocalization) -> str:
+    if found.whole_body and not found.candidates:
+        share = f"the markers' box is {100 * found.box:.0f} % of the body's"
+        return f"Not searched: the whole body was taken, since {share}."
+    return "Each laid over the markers by one yaw, a shift in every frame, and shape."
+
+
+def _yaws(ranked: Orientation | None) -> tuple[CandidateRow, ...]:
+    if ranked is None:
+        return ()
+    rows = []
+    for i, own in enumerate(ranked.candidates):
+        if own.refined:
+            row = CandidateRow(-1, i, "refined", own.part, bone_names(own.bone))
+            rows.append(_relaxed(row, ranked))
+    return tuple(rows)
+
+
+def _chains(found: PaperLocalization, ranked: Orientation | None) -> tuple[CandidateRow, ...]:
+    """Scored chains, best first, then those not scored, then those that were pruned."""
+    place = {} if ranked is None else {c.hypothesis: i for i, c in enumerate(ranked.candidates) if not c.refined}
+    order = np.argsort([fit.chamfer for fit in found.candidates], kind="stable")
+    rows = []
+    for row in order:
+        fit = found.candidates[row]
+        rows.append(
+            CandidateRow(
+                pool=int(row),
+                candidate=place.get(int(row), -1),
+                fate="scored",
+                part=part_name(fit.bones),
+                bones=bone_names(fit.bones),
+                yaw_deg=fit.yaw_deg,
+                distance=1000 * fit.one_way**0.5,
+                score=1e6 * fit.chamfer,
+                margin=fit.chamfer / max(found.candidates[order[0]].chamfer, 1e-12),
+            )
+        )
+    for i in range(len(found.candidates), len(found.pruned)):
+        rows.append(CandidateRow(i, -1, "kept", part_name(found.pruned[i]), bone_names(found.pruned[i])))
+    kept = {frozenset(int(j) for j in chain) for chain in found.pruned}
+    size = found.pruned.shape[1] if found.pruned.ndim == 2 else 0
+    if size:
+        for chain in subtrees(size):
+            if chain not in kept:
+                bones = np.array(sorted(chain))
+                rows.append(CandidateRow(-1, -1, "too alike", part_name(bones), bone_names(bones)))
+    return tuple(rows)
+
+
+def _all(rows: Sequence[CandidateRow]) -> tuple[int, ...]:
+    return tuple(range(len(rows)))

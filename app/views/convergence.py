@@ -1,0 +1,103 @@
+"""How the energies fell, iteration by iteration, and which iterations can be shown on the body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.views.colours import RGB, rgb
+from solver.solve.paper.results import Descent, PaperLocalization, PaperSolve, Trace
+from solver.solve.results import Orientation
+from widgets import palette
+
+_CHAINS_SHOWN = 5
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyCurve:
+    """One descent.
+
+    Attributes
+    ----------
+    stage : of the solve, in words; only curves of one stage have the same energy
+    label : which candidate or yaw
+    candidate : its row in the orientation, -1 if it has none
+    iteration, energy : (n,)
+    colour : of the candidate, whatever the stage
+    ended : how it ended, "" where that is not known
+    trace : poses at the iterations, where the method keeps them: then row k is iteration ``iteration[k]``
+    vertex : (U,) of each marker in that stage, (0,) before any were given
+    """
+
+    stage: str
+    label: str
+    candidate: int
+    iteration: np.ndarray
+    energy: np.ndarray
+    colour: RGB
+    ended: str = ""
+    trace: Trace | None = None
+    vertex: np.ndarray | None = None
+
+    def step(self, iteration: int) -> int:
+        """The row at or before an iteration."""
+        return max(0, int(np.searchsorted(self.iteration, iteration, side="right")) - 1)
+
+
+def of_orientation(ranked: Orientation) -> tuple[EnergyCurve, ...]:
+    """The default method's descents, one a candidate; between its phases the terms are weighed anew, so curves jump.
+
+    It keeps no poses on the way.
+    """
+    colours = palette.categorical(len(ranked.candidates))
+    return tuple(
+        EnergyCurve(
+            stage="all phases" if own.refined else "first phases, then left behind",
+            label=f"{i + 1}: {own.part}, heading {own.heading_deg:.0f}°",
+            candidate=i,
+            iteration=1 + np.arange(len(own.trace)),
+            energy=np.array(own.trace, dtype=float),
+            colour=rgb(colours[i]),
+        )
+        for i, own in enumerate(ranked.candidates)
+    )
+
+
+def of_paper(
+    found: PaperLocalization, solved: PaperSolve | None = None, ranked: Orientation | None = None
+) -> tuple[EnergyCurve, ...]:
+    """The published method's descents: the best chains, then stages 2, 4 and 5 of every yaw."""
+    curves = []
+    nothing = np.zeros(0, dtype=np.intp)
+    order = np.argsort([fit.chamfer for fit in found.candidates], kind="stable")[:_CHAINS_SHOWN]
+    chain_row = _rows(ranked, refined=False)
+    for place, row in enumerate(order):
+        fit = found.candidates[row]
+        label = f"chain {place + 1}, yaw {fit.yaw_deg:.0f}°"
+        colour = rgb(palette.categorical(_CHAINS_SHOWN)[place])
+        curves.append(_curve("part search", label, chain_row.get(int(row), -1), fit.descent, colour, nothing))
+    if solved is None:
+        return tuple(curves)
+    yaw_row = _rows(ranked, refined=True)
+    colours = palette.categorical(len(solved.yaws))
+    for i, yaw in enumerate(solved.yaws):
+        label, row, colour = f"yaw {yaw.start_deg:.0f}°", yaw_row.get(i, -1), rgb(colours[i])
+        curves.append(_curve("2: pose", label, row, yaw.pose.descent, colour, nothing))
+        curves.append(_curve("4: markers on vertices", label, row, yaw.markers.descent, colour, yaw.vertex))
+        if i == solved.chosen:
+            curves.append(_curve("5: refinement", label, row, solved.refined.descent, colour, solved.vertex))
+    return tuple(curves)
+
+
+def _rows(ranked: Orientation | None, *, refined: bool) -> dict[int, int]:
+    """Row in the orientation of each yaw (refined) or chain (not)."""
+    if ranked is None:
+        return {}
+    return {own.hypothesis: i for i, own in enumerate(ranked.candidates) if own.refined == refined}
+
+
+def _curve(stage: str, label: str, row: int, descent: Descent, colour: RGB, vertex: np.ndarray) -> EnergyCurve:
+    ended = "converged" if descent.converged else f"stopped at the cap of {descent.iterations} iterations"
+    trace = descent.trace
+    return EnergyCurve(stage, label, row, trace.iteration, trace.energy, colour, ended, trace, vertex)

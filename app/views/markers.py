@@ -1,0 +1,94 @@
+"""One row a marker: when it was seen, where it was put, how well it is explained."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.views.colours import bone_name
+from app.views.tracks import MEASURED, MarkerTracks
+from solver.segment import Segmentation
+from solver.solve.results import FittedMotion
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerTable:
+    """Columns of M markers.
+
+    Attributes
+    ----------
+    labels : names as the file has them
+    measured : per cent of the frames
+    gaps : stretches without a measurement, those at the ends included
+    longest_gap : s
+    group : of markers that move together, counted from 1; 0 for none
+    bone : the bone it was given to, "" for none
+    mean, p95, worst : mm, distance from where the body puts it; NaN where it was not used
+    worst_frame : frame of the worst, -1 without any
+    worst_time : s, marker clock
+    """
+
+    labels: tuple[str, ...]
+    measured: np.ndarray
+    gaps: np.ndarray
+    longest_gap: np.ndarray
+    group: np.ndarray
+    bone: tuple[str, ...]
+    mean: np.ndarray
+    p95: np.ndarray
+    worst: np.ndarray
+    worst_frame: np.ndarray
+    worst_time: np.ndarray
+
+
+def marker_table(
+    tracks: MarkerTracks, segmentation: Segmentation | None = None, motion: FittedMotion | None = None
+) -> MarkerTable:
+    """The markers of a session as far as they are known."""
+    width = tracks.state.shape[1]
+    measured = tracks.state == MEASURED
+    gaps, longest = gap_lengths(~measured)
+    nothing = np.full(width, -1)
+    joints = nothing if motion is None else motion.marker_joint
+    mean, p95, worst, frame = _residuals(np.full((1, width), np.nan) if motion is None else motion.residual)
+    return MarkerTable(
+        labels=tracks.markers.labels,
+        measured=100 * measured.mean(axis=0),
+        gaps=gaps,
+        longest_gap=longest / tracks.markers.rate,
+        group=1 + (nothing if segmentation is None else segmentation.clusters),
+        bone=tuple(bone_name(int(j)) for j in joints),
+        mean=mean,
+        p95=p95,
+        worst=worst,
+        worst_frame=frame,
+        worst_time=np.where(frame < 0, np.nan, tracks.markers.first_time + frame / tracks.markers.rate),
+    )
+
+
+def gap_lengths(lost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How many stretches of True each column (T, M) has, and how many frames the longest lasts: (M,) each."""
+    width = lost.shape[1]
+    edge = np.zeros((1, width), dtype=np.int8)
+    change = np.diff(np.concatenate([edge, lost.astype(np.int8), edge]), axis=0).T
+    column, start = np.nonzero(change == 1)
+    _, stop = np.nonzero(change == -1)
+    longest = np.zeros(width, dtype=np.int64)
+    np.maximum.at(longest, column, stop - start)
+    return np.bincount(column, minlength=width), longest
+
+
+def _residuals(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Mean, 95th percentile and worst, mm, and the frame of the worst (-1 without any) of each column (T, M) m."""
+    width = residual.shape[1]
+    mean, p95, worst = (np.full(width, np.nan) for _ in range(3))
+    frame = np.full(width, -1)
+    for m in range(width):
+        column = residual[:, m]
+        known = column[np.isfinite(column)]
+        if len(known):
+            mean[m], p95[m] = 1000 * known.mean(), 1000 * np.percentile(known, 95)
+            frame[m] = int(np.nanargmax(column))
+            worst[m] = 1000 * column[frame[m]]
+    return mean, p95, worst, frame
