@@ -57,11 +57,11 @@ _LUNGE = (
 )  # fmt: skip
 _JACK = (
     Key(0, {}),
-    Key(0.25, _both({"down": 0.10, "lean": 0.12, "arm_out": 0.2, "arm_elbow": 0.3})),
+    Key(0.25, _both({"down": 0.10, "lean": 0.12, "arm_out": 0.2, "arm_elbow": 0.3, "bend": 0.25})),
     Key(0.50, _both({"foot_wide": 0.12, "foot_lift": 0.10, "foot_point": 0.35, "arm_out": 1.2})),
-    Key(0.75, _both({"foot_wide": 0.24, "down": 0.08, "arm_out": 2.5, "arm_elbow": 0.3, "lean": 0.1})),
+    Key(0.75, _both({"foot_wide": 0.24, "down": 0.08, "arm_out": 2.5, "arm_elbow": 0.3, "lean": 0.1, "bend": -0.15})),
     Key(1.00, _both({"foot_wide": 0.12, "foot_lift": 0.10, "foot_point": 0.35, "arm_out": 1.2})),
-    Key(1.25, _both({"down": 0.08, "lean": 0.1, "arm_out": 0.1})),
+    Key(1.25, _both({"down": 0.08, "lean": 0.1, "arm_out": 0.1, "bend": 0.2})),
     Key(1.40, {}),
 )
 _KICK = (

@@ -23,6 +23,7 @@ from solver.synth.rig import LAB_FROM_REST, Foot, Sway, set_leg, standing_height
 _X, _Y, _Z = np.eye(3)
 _MIRRORED = ("left", "list", "turn", "side", "twist", "look")  # change their sign where left and right are exchanged
 _FASTER, _SMALLER = (0.85, 1.2), (0.8, 1.1)  # how unlike two repetitions are
+_SOFT = 0.05  # s, over which a change of pace is drawn out
 _SIDES = ("left", "right")
 
 
@@ -85,6 +86,7 @@ class Course:
 def _course(cycles: Sequence[Sequence[Key]], time: np.ndarray, rng: np.random.Generator) -> Course:
     """The channels of repeated cycles, flat where two key poses agree, so that a planted foot stays."""
     from scipy.interpolate import PchipInterpolator
+    from scipy.ndimage import gaussian_filter1d
 
     names = sorted({name for cycle in cycles for key in cycle for name in key.pose})
     moments, poses = [], []
@@ -98,7 +100,7 @@ def _course(cycles: Sequence[Sequence[Key]], time: np.ndarray, rng: np.random.Ge
         clock += slower * cycle[-1].time
         count += 1
     inside = np.clip(time, moments[0], moments[-1])
-    values = PchipInterpolator(moments, np.array(poses))(inside)
+    values = gaussian_filter1d(PchipInterpolator(moments, np.array(poses))(inside), _SOFT / (time[1] - time[0]), axis=0)
     return Course(dict(zip(names, values.T, strict=True)), len(time))
 
 

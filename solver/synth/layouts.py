@@ -29,7 +29,7 @@ LAYOUTS: dict[str, tuple[str, ...]] = {
         *(place for side in ("left", "right") for place in _sided(side, ("acromion", *_ARM, *_LEG))),
     ),
     **{f"{side}_arm": _sided(side, (*_ARM, "triceps", "forearm_back", "thumb_side")) for side in ("left", "right")},
-    **{f"{side}_leg": _sided(side, (*_LEG, "thigh_front", "shin", "toe")) for side in ("left", "right")},
+    **{f"{side}_leg": _sided(side, (*_LEG, "thigh_front", "shin", "hallux")) for side in ("left", "right")},
     **{
         f"{side}_shoulder": (
             *("t8", "sternum_ij", "sternum_px"),
@@ -52,6 +52,7 @@ _BESIDE: dict[str, tuple[str, str, float, tuple[float, float, float]]] = {
     "thigh_front": ("hip", "knee", 0.45, _FRONT),
     "shank": ("knee", "ankle", 0.5, (1.0, 0, 0.2)),
     "shin": ("knee", "ankle", 0.4, (0.2, 0, 1.0)),
+    "hallux": ("foot", "foot", 0.0, (-0.4, 0.6, 1.0)),
     "clavicle": ("collar", "shoulder", 0.4, (0, 0.6, 0.8)),
     "scapula": ("collar", "shoulder", 0.3, (0, -0.4, -1.0)),
     "front_head": ("head", "head", 0.0, (0.6, 1.1, 0.9)),

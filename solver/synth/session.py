@@ -154,7 +154,9 @@ def _carried(
 ) -> np.ndarray:
     """(T, M, 3) m, the markers on the body, sliding with its skin."""
     turns, _ = chain(motion.rotations, body.joints(betas), motion.trans)
-    slide = settings.slide * sliding(motion, sites.joint, stream(seed, "slide"))
+    spare = np.zeros(max(0, MOST_NESTED - len(sites)), np.intp)  # so that the numbers drawn are those of more markers
+    joint = np.concatenate([sites.joint, spare])
+    slide = settings.slide * sliding(motion, joint, stream(seed, "slide"))[:, : len(sites)]
     if settings.still is not None:  # skin slides as far as joints bend
         slide = slide * settings.still
     own_turn = turns[:, sites.joint]
