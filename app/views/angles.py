@@ -13,6 +13,14 @@ from solver.angles import JointAngles, conventions, evidence
 from widgets import palette
 
 Side = Literal["left", "right", ""]
+_LONG = {
+    "flex": "flexion",
+    "add": "adduction",
+    "rot": "rotation",
+    "dev": "deviation",
+    "pro": "pronation",
+    "sup": "supination",
+}
 _COLOURS: dict[Side, RGB] = {"left": palette.LEFT, "right": palette.RIGHT, "": (90, 90, 95)}
 
 
@@ -108,7 +116,7 @@ def title_of(pattern: str) -> str:
     """What a column is of, in words: "hip_flexion_{s}" is "Hip flexion", "{S}HipAnglesX" is "Hip angles X"."""
     words = re.sub(r"_?\{[sS]\}_?", "", pattern)
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", words)
-    parts = [part if len(part) == 1 else part.lower() for part in words.split("_") if part]
+    parts = [part if len(part) == 1 else _LONG.get(part, part.lower()) for part in words.split("_") if part]
     return " ".join([parts[0].capitalize(), *parts[1:]]) if parts else ""
 
 
