@@ -135,6 +135,9 @@ class Document:
         if left is not None and left.alive and not although_open:
             raise InputError("is open in another window", path, "close it there first")
         on_disk = load_session(path) if left is None or session_folder(path) is not None else None
+        for session in (on_disk, None if left is None else left.history.session):
+            if session is not None:  # settings that cannot be used are refused here, not later
+                session.stage_settings(graph_of(session))
         self.close()
         if left is None:
             assert on_disk is not None

@@ -15,7 +15,7 @@ from app.models.ranges import RANGES
 
 Kind = Literal["float", "int", "bool", "choice", "text"]
 
-_TITLES = {
+TITLES = {
     "markers": "Markers",
     "clean": "Cleaning",
     "landmarks": "Video landmarks",
@@ -90,7 +90,7 @@ class Setting:
 
 def title(stage: str) -> str:
     """A stage's name as the user reads it."""
-    return _TITLES.get(stage, stage.replace("_", " ").capitalize())
+    return TITLES.get(stage, stage.replace("_", " ").capitalize())
 
 
 def settings_of(stage: str, settings: Any, decided: frozenset[str] = frozenset()) -> tuple[Setting, ...]:

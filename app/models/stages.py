@@ -1,0 +1,281 @@
+"""The stages of the open session: their states, settings and results, derived from keys and never remembered."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.models.document import Document
+from app.models.edits import Edit, decided
+from app.models.fields import TITLES, Setting, settings_of, title
+from app.models.lineage import go_back, lineage_of, said_difference
+from app.models.regroup import regrouped
+from app.models.results import Ref, Results, StageResults, written
+from app.models.signal import Signal
+from solver.errors import InputError
+from solver.pipeline.methods import graph_of
+from solver.pipeline.session import Session
+from solver.pipeline.stage import Source, Stage, State, stage_keys
+from solver.pipeline.stages import SOURCES
+from solver.pipeline.store import Entry, Store
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a stage has no result.
+
+    Attributes
+    ----------
+    stage, key : which result it would have been
+    what, where, remedy : what happened, where, and what to do about it
+    details : for a report of a mistake in the program; not for the user to read
+    """
+
+    stage: str
+    key: str
+    what: str
+    where: str = ""
+    remedy: str = ""
+    details: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """All of it."""
+        place = f"{self.where}: " if self.where else ""
+        return f"{place}{self.what}{f'; {self.remedy}' if self.remedy else ''}."
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """A result of a stage that is in the store.
+
+    Attributes
+    ----------
+    key : which
+    settings : what differs from the settings in force, in words; empty for the one in force
+    when : when it was computed, in words
+    headline : its figure
+    current : whether it is the one in force
+    compared : whether it is shown beside the one in force
+    """
+
+    key: str
+    settings: str
+    when: str
+    headline: str
+    current: bool
+    compared: bool
+
+
+@dataclass(frozen=True)
+class Card:
+    """All there is to say of a stage.
+
+    Attributes
+    ----------
+    name, title, help : of the stage
+    state : cached, stale, running, failed, not run
+    key : of the result that the settings ask for
+    seconds : how long the result took, None without one
+    headline : of the result; why it failed; or, where it is stale, of the latest result there is
+    fields : its settings
+    earlier : its results, the newest first
+    why_not : why it cannot be run, empty if it can
+    """
+
+    name: str
+    title: str
+    state: State
+    key: str
+    seconds: float | None = None
+    headline: str = ""
+    fields: tuple[Setting, ...] = ()
+    earlier: tuple[Earlier, ...] = ()
+    help: str = ""
+    why_not: str = ""
+
+
+class StageBoard:
+    """The stages of the document's session.
+
+    Attributes
+    ----------
+    changed : emitted when anything about any stage may have changed
+    results : of the session, whatever their settings; another object for another session
+    compared : results that are shown beside those in force
+    problem : why the stages cannot be run, None if they can
+    """
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.changed: Signal[[]] = Signal()
+        self.results = Results(Store(Path()))
+        self.compared: set[Ref] = set()
+        self.problem: InputError | None = None
+        self.keys: dict[str, str] = {}
+        self.sources: dict[str, Source] = {}
+        self.settings: dict[str, Any] = {}
+        self.graph: tuple[Stage, ...] = ()
+        self._running: Ref | None = None
+        self._failures: dict[Ref, Failure] = {}
+        document.changed.connect(self._follow)
+        if document.is_open:
+            self._follow(True)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The stages of the method, in the order they are shown."""
+        order = list(TITLES)
+        return tuple(sorted(self.keys, key=lambda name: order.index(name) if name in order else len(order)))
+
+    @property
+    def current(self) -> StageResults:
+        """The results in force; a stage that is stale or was not run is not in it."""
+        return self.results.of(self.keys)
+
+    def state(self, stage: str) -> State:
+        """A stage's state, from its key."""
+        ref = Ref(stage, self.keys[stage])
+        if ref == self._running:
+            return "running"
+        if self.results.has(*_pair(ref)):
+            return "cached"
+        if ref in self._failures:
+            return "failed"
+        return "stale" if self.results.entries(stage) else "not run"
+
+    def latest(self, stage: str) -> tuple[str, bool] | None:
+        """Key of what there is to draw of a stage, and whether it is in force; a stale one is to be drawn as such."""
+        key = self.keys.get(stage)
+        if key is None:
+            return None
+        if self.results.has(stage, key):
+            return key, True
+        entries = self.results.entries(stage)
+        return (entries[0].key, False) if entries else None
+
+    def failure(self, stage: str) -> Failure | None:
+        """Why a stage failed with its settings as they are."""
+        return self._failures.get(Ref(stage, self.keys.get(stage, "")))
+
+    def card(self, stage: str) -> Card:
+        """All there is to say of a stage."""
+        own = next(s for s in self.graph if s.name == stage)
+        key, state = self.keys[stage], self.state(stage)
+        entries = self.results.entries(stage)
+        shown = self.results.entry(stage, key) or (entries[0] if entries and state == "stale" else None)
+        failure = self.failure(stage)
+        headline = (
+            failure.sentence if failure and state == "failed" else str(shown.about.get("headline", "")) if shown else ""
+        )
+        return Card(
+            name=stage,
+            title=title(stage),
+            state=state,
+            key=key,
+            seconds=float(shown.about.get("seconds", 0.0)) if shown else None,
+            headline=headline,
+            fields=settings_of(stage, self.settings[stage], decided(self.document.session, stage)),
+            earlier=tuple(self._earlier(stage, entry) for entry in entries),
+            help=(own.run.__doc__ or "").strip().split("\n")[0],
+            why_not="" if self.problem is None else str(self.problem),
+        )
+
+    @property
+    def cards(self) -> tuple[Card, ...]:
+        """All there is to say of every stage."""
+        return tuple(self.card(name) for name in self.names)
+
+    def go_back(self, stage: str, key: str) -> Edit:
+        """The edit that makes an earlier result of a stage the one in force.
+
+        Raises
+        ------
+        InputError : it was computed from other files, or by settings that this version does not have
+        """
+        return go_back(self.document.session, self.sources, self.results, stage, key)
+
+    def compare(self, stage: str, key: str, on: bool) -> None:
+        """Show a result beside the one in force, or no more."""
+        ref = Ref(stage, key)
+        if (ref in self.compared) != on and (not on or self.results.has(stage, key)):
+            self.compared ^= {ref}
+            self.changed.emit()
+
+    def begin(self, stage: str, key: str) -> None:
+        """A worker has begun with a stage."""
+        self._running = Ref(stage, key)
+        self._failures.pop(self._running, None)
+        self.changed.emit()
+
+    def end(self, failure: Failure | None = None) -> None:
+        """The worker has ended with the stage it was at."""
+        self._running = None
+        if failure is not None:
+            self._failures[Ref(failure.stage, failure.key)] = failure
+        self.changed.emit()
+
+    def refresh(self) -> None:
+        """Look again at the files the session was made from, and at the store."""
+        self._follow(False)
+
+    def _follow(self, another: bool) -> None:
+        if another:
+            self.results.close()
+            self.compared, self._failures, self._running = set(), {}, None
+            self.keys, self.sources, self.settings, self.graph, self.problem = {}, {}, {}, (), None
+            folder = self.document.folder if self.document.is_open else Path()
+            self.results = Results(Store(folder / "results"))
+        if self.document.is_open:
+            self._derive(self.document.session)
+        self.changed.emit()
+
+    def _derive(self, session: Session) -> None:
+        self.graph = graph_of(session)
+        self.settings = session.stage_settings(self.graph)
+        self.sources, self.problem = known_sources(session)
+        self.keys = stage_keys(self.graph, self.sources, self.settings)
+        regrouped(self.graph, self.keys, self.settings, self.results)
+        self.compared = {ref for ref in self.compared if self.results.has(*_pair(ref))}
+
+    def _earlier(self, stage: str, entry: Entry) -> Earlier:
+        current = entry.key == self.keys[stage]
+        said = ""
+        if not current:
+            past = lineage_of(self.results, stage, entry.key)
+            said = said_difference(past, self.graph, stage, self.settings, self.sources)
+        when = time.strftime("%Y-%m-%d %H:%M", time.localtime(written(entry)))
+        headline = str(entry.about.get("headline", ""))
+        return Earlier(entry.key, said, when, headline, current, Ref(stage, entry.key) in self.compared)
+
+
+def known_sources(session: Session) -> tuple[dict[str, Source], InputError | None]:
+    """The session's files as sources, and what is wrong with one, if something is.
+
+    A file that has gone is taken to hold what it held: what was computed from it can still be looked at.
+    """
+    cache, found, problem = session.digests, dict[str, Source](), None
+    for name in SOURCES:
+        given = session.inputs.get(name)
+        try:
+            found[name] = Source.file(given.path if given else None, cache)
+        except InputError as error:
+            assert given is not None
+            found[name] = Source(given.path, given.digest or "missing")
+            problem = problem or error
+    cache.save()
+    if problem is None and not {"video_file", "prior_file"} & session.inputs.keys():
+        problem = InputError("there is neither a video nor a pose prior", "the session", "add one of them")
+    return found, problem
+
+
+def states_of(board: StageBoard) -> Mapping[str, State]:
+    """Every stage's state."""
+    return {name: board.state(name) for name in board.names}
+
+
+def _pair(ref: Ref) -> tuple[str, str]:
+    return ref.stage, ref.key
