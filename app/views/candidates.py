@@ -11,7 +11,6 @@ import numpy as np
 from app.views.colours import bone_name
 from solver.body.skeleton import subtrees
 from solver.solve.confidence import same_answer
-from solver.solve.method import part_name
 from solver.solve.paper.results import PaperLocalization
 from solver.solve.results import Localization, Orientation
 
@@ -142,6 +141,12 @@ def bone_names(bones: Sequence[int] | np.ndarray) -> tuple[str, ...]:
     return tuple(bone_name(int(j)) for j in np.unique(bones) if j >= 0)
 
 
+def _part_name(bones: np.ndarray) -> str:
+    from solver.solve.method import part_name  # brings the solver and half of scipy with it
+
+    return part_name(bones)
+
+
 def _of_hypotheses(
     found: Localization, ranked: Orientation | None
 ) -> tuple[tuple[CandidateRow, ...], tuple[Step, ...]]:
@@ -153,7 +158,7 @@ def _of_hypotheses(
             pool=h,
             candidate=place.get(h, -1),
             fate="found" if ranked is None else "merged",
-            part=part_name(found.bone[h]),
+            part=_part_name(found.bone[h]),
             bones=bone_names(found.bone[h]),
             yaw_deg=float(found.yaw_deg[h]),
             heading_deg=float(np.degrees(np.arctan2(view[1], view[0]))),
@@ -240,7 +245,7 @@ def _chains(found: PaperLocalization, ranked: Orientation | None) -> tuple[Candi
                 pool=int(row),
                 candidate=place.get(int(row), -1),
                 fate="scored",
-                part=part_name(fit.bones),
+                part=_part_name(fit.bones),
                 bones=bone_names(fit.bones),
                 yaw_deg=fit.yaw_deg,
                 distance=1000 * fit.one_way**0.5,
@@ -249,14 +254,14 @@ def _chains(found: PaperLocalization, ranked: Orientation | None) -> tuple[Candi
             )
         )
     for i in range(len(found.candidates), len(found.pruned)):
-        rows.append(CandidateRow(i, -1, "kept", part_name(found.pruned[i]), bone_names(found.pruned[i])))
+        rows.append(CandidateRow(i, -1, "kept", _part_name(found.pruned[i]), bone_names(found.pruned[i])))
     kept = {frozenset(int(j) for j in chain) for chain in found.pruned}
     size = found.pruned.shape[1] if found.pruned.ndim == 2 else 0
     if size:
         for chain in subtrees(size):
             if chain not in kept:
                 bones = np.array(sorted(chain))
-                rows.append(CandidateRow(-1, -1, "too alike", part_name(bones), bone_names(bones)))
+                rows.append(CandidateRow(-1, -1, "too alike", _part_name(bones), bone_names(bones)))
     return tuple(rows)
 
 
