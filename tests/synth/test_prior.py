@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from solver.body.model import Body
+from solver.body.skeleton import mirror_index
 from solver.rotations import log_so3
 from solver.synth import Motion, demo_motion
-from solver.synth.prior import PriorError, corrupt_prior
+from solver.synth.prior import PriorError, corrupt_prior, left_for_right
+
+SIDES = mirror_index()
 
 
 @pytest.fixture(scope="module")
@@ -46,3 +51,48 @@ def test_the_seed_decides(motion: Motion) -> None:
     one, same, other = (corrupt_prior(motion, np.random.default_rng(s))[0].rotations for s in (1, 1, 2))
     np.testing.assert_array_equal(one, same)
     assert not np.allclose(one, other)
+
+
+def test_each_error_is_drawn_on_its_own(motion: Motion) -> None:
+    plain, R, _ = corrupt_prior(motion, np.random.default_rng(3))
+    for more in (PriorError(lost=0.3), PriorError(flips=2)):
+        other, R_other, _ = corrupt_prior(motion, np.random.default_rng(3), more)
+        np.testing.assert_array_equal(R, R_other)
+        same = np.isclose(plain.rotations, other.rotations).all(axis=(1, 2, 3))
+        assert 0.3 < same.mean() < 0.99
+        assert (same | ~other.tracked).all() == (more.flips == 0)
+
+
+def test_lost_spans_are_as_long_as_asked_and_filled_from_their_ends(motion: Motion) -> None:
+    prior, _, _ = corrupt_prior(motion, np.random.default_rng(5), PriorError(lost=0.3))
+    assert (~prior.tracked).sum() == round(0.3 * len(prior.tracked))
+    spans = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], ~prior.tracked, [0]]))))[::2]
+    assert spans.max() >= 9, "no span of 0.3 s"
+    np.testing.assert_allclose(np.linalg.det(prior.rotations), 1)
+    first = np.flatnonzero(prior.tracked)[0]
+    np.testing.assert_allclose(prior.rotations[:first], np.broadcast_to(prior.rotations[first], (first, 24, 3, 3)))
+
+
+def test_a_flip_leaves_the_picture_and_exchanges_left_and_right(motion: Motion) -> None:
+    body = Body.load()
+    both_alike = replace(body, joint_template=0.5 * (body.joint_template + body.joint_template[SIDES] * [-1, 1, 1]))
+    seen, _, _ = corrupt_prior(motion, np.random.default_rng(1), PriorError(noise=0))
+    flipped = left_for_right(seen.rotations)
+    np.testing.assert_allclose(np.linalg.det(flipped), 1)
+    np.testing.assert_allclose(left_for_right(flipped), seen.rotations, atol=1e-12)
+    rest = both_alike.joint_template[0]
+    places = [
+        both_alike.pose(r, np.zeros(10), np.tile(-rest, (len(r), 1)), want_vertices=False)[1]
+        for r in (seen.rotations, flipped)
+    ]
+    np.testing.assert_allclose(places[1], places[0][:, SIDES] * [1, 1, -1], atol=1e-9)
+
+
+def test_flips_are_in_spans(motion: Motion) -> None:
+    plain, flipped = (
+        corrupt_prior(motion, np.random.default_rng(2), PriorError(noise=0, flips=n))[0].rotations for n in (0, 1)
+    )
+    changed = ~np.isclose(plain, flipped).all(axis=(1, 2, 3))
+    at = np.flatnonzero(changed)
+    assert len(at) == at[-1] - at[0] + 1 and 1 <= len(at) <= 30
+    np.testing.assert_allclose(flipped[changed], left_for_right(plain[changed]))
