@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
 
     evaluate = commands.add_parser("evaluate", help=COMMANDS["evaluate"], description=_sentence("evaluate"))
     evaluate.add_argument("result", type=Path, metavar="RESULT", help="folder that solve wrote, or its motion.npz")
-    evaluate.add_argument("reference", type=Path, metavar="REFERENCE", help="another result, or an AMASS-layout npz")
+    evaluate.add_argument("reference", type=Path, metavar="REFERENCE", help="another result, npz, stageii.pkl or .mot")
     evaluate.add_argument("--body", type=Path, metavar="FILE", help="SMPL-layout model of the reference")
     _common(evaluate)
     evaluate.set_defaults(run=run_evaluate)
@@ -143,7 +143,7 @@ def _bench_options(bench: argparse.ArgumentParser) -> None:
 
     what = bench.add_argument_group("what is run")
     what.add_argument("--motions", type=Path, metavar="DIR", help="movements: BVH files, AMC files and their ASF")
-    what.add_argument("--motion-count", type=int, metavar="N", help="movements of the folder (default: 5)")
+    what.add_argument("--motion-count", type=int, metavar="N", help="movements (default: 5, evenly spread)")
     what.add_argument("--methods", type=names, metavar="A,B", help="methods to compare (default: the suite's)")
     what.add_argument("--cases", type=names, metavar="A,B", help="some of the suite's cases")
     what.add_argument("--seeds", type=int, metavar="N", help="sessions of each case and movement (default: 1)")

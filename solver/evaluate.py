@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from solver import metrics
-from solver.body.model import Body
 from solver.body.skeleton import JOINTS
 from solver.errors import InputError
-from solver.io.motion_in import MOTION, MotionFile, read_motion
+from solver.io.motion_in import MotionFile, read_motion
 from solver.markers import Markers
 from solver.pipeline.request import EvaluateRequest, Outcome
+from solver.posed import Posed, angles_of, body_of, load_body, measured_markers, posed, times_of
 from solver.progress import Progress, part_of, silent
+
+__all__ = [
+    "Evaluation",
+    "Posed",
+    "compare",
+    "evaluate",
+    "evaluate_result",
+    "lines_of",
+    "measured_markers",
+    "posed",
+    "summary_of",
+]
 
 _MOST_MESHES = 100
 """Frames, evenly spread, in which whole surfaces are compared."""
-_MARKERS = "markers_labelled.c3d"
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,44 +60,13 @@ class Evaluation:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Posed:
-    """A motion on its body, on the clock of the comparison.
-
-    Attributes
-    ----------
-    body : with as many shape coefficients as ``betas``
-    betas : (S,)
-    time : (T,) s
-    rotations, trans : pose of each frame
-    joints : (T, 24, 3) m
-    """
-
-    body: Body
-    betas: np.ndarray
-    time: np.ndarray
-    rotations: np.ndarray
-    trans: np.ndarray
-    joints: np.ndarray
-
-    def at(self, time: np.ndarray) -> Posed:
-        """The motion at other times: joints and places linear between frames, rotations by slerp, NaN outside."""
-        return replace(
-            self,
-            time=time,
-            rotations=metrics.rotations_at(self.time, self.rotations, time),
-            trans=metrics.points_at(self.time, self.trans, time),
-            joints=metrics.points_at(self.time, self.joints, time),
-        )
-
-    def vertices(self, frames: np.ndarray) -> np.ndarray:
-        """(n, V, 3) m."""
-        mesh: np.ndarray = self.body.pose(self.rotations[frames], self.betas, self.trans[frames])[0]
-        return mesh
-
-
 def evaluate_result(request: EvaluateRequest, progress: Progress = silent) -> Outcome:
     """What ``markerscope evaluate`` prints."""
+    from solver.evaluate_angles import evaluate_angles, is_angle_table
+
+    if is_angle_table(request.result) or is_angle_table(request.reference):
+        compared = evaluate_angles(request.result, request.reference, body=request.body)
+        return Outcome(summary=compared.summary(), lines=compared.lines(), warnings=compared.notes)
     found = evaluate(request.result, request.reference, body=request.body, progress=progress)
     return Outcome(summary=summary_of(found), lines=lines_of(found), warnings=found.notes)
 
@@ -98,8 +78,8 @@ def evaluate(
 
     Parameters
     ----------
-    result : folder that a solve wrote, or its ``motion.npz``
-    reference : another result, or an npz in AMASS layout in the same world frame (z up)
+    result : folder that a solve wrote, its ``motion.npz``, or what a reference may be
+    reference : another result, an npz in AMASS layout or a ``*_stageii.pkl``, in the same world frame (z up)
     body : the SMPL model file that the reference was made with, where it is not a result
     progress : called along the way
 
@@ -109,10 +89,10 @@ def evaluate(
         Where either cannot be read, or they do not overlap in time.
     """
     found, other = read_motion(result), read_motion(reference)
-    clock, clock_notes = _clock(found, other)
-    own_body, other_body = _body_of(result), Path(body) if body else _body_of(reference)
-    bodies = {path: _load_body(path) for path in {own_body, other_body}}
-    ours, notes = posed(found, _times(found), bodies[own_body], known=own_body is not None)
+    our_clock, clock, clock_notes = _clocks(found, other)
+    own_body, other_body = body_of(result), Path(body) if body else body_of(reference)
+    bodies = {path: load_body(path) for path in {own_body, other_body}}
+    ours, notes = posed(found, our_clock, bodies[own_body], known=own_body is not None)
     theirs, other_notes = posed(other, clock, bodies[other_body], known=other_body is not None)
     if body is None:
         theirs = _on_true_body(theirs, other.source)
@@ -181,64 +161,17 @@ def compare(
     )
 
 
-def _times(motion: MotionFile) -> np.ndarray:
-    return np.arange(len(motion.rotations)) / motion.rate if motion.time is None else motion.time
-
-
-def _clock(found: MotionFile, other: MotionFile) -> tuple[np.ndarray, tuple[str, ...]]:
-    """The reference's times; a file that has none is taken to start with the result."""
-    if other.time is not None:
-        return other.time, ()
-    start = float(_times(found)[0])
-    note = f"{Path(other.source).name} has no times of its own and is taken to start with the result, at {start:.2f} s."
-    return start + _times(other), (note,)
-
-
-def _body_of(path: str | Path) -> Path | None:
-    """The user's body that a result was solved with; None is the embedded one."""
-    from solver.pipeline.session import load_session, session_folder
-
-    folder = session_folder(Path(path).parent if Path(path).name == MOTION else path)
-    if folder is None:
-        return None
-    file = load_session(folder).inputs.get("body_file")
-    return None if file is None else Path(file.path)
-
-
-def _load_body(path: Path | None) -> Body:
-    from solver.body.bones import with_bone_lengths
-
-    return with_bone_lengths(Body.load(path))
-
-
-def posed(motion: MotionFile, time: np.ndarray, body: Body, *, known: bool) -> tuple[Posed, tuple[str, ...]]:
-    """The motion on ``body``, which is ``known`` to be its own or only taken to be."""
-    betas = np.zeros(body.shape_count)
-    own = min(len(motion.betas), body.betas_count)
-    betas[:own] = motion.betas[:own]
-    if len(motion.bone_lengths) == body.shape_count - body.betas_count:
-        betas[body.betas_count :] = motion.bone_lengths
-    joints = motion.joints
-    notes: tuple[str, ...] = ()
-    if joints is None:
-        _, joints = body.pose(motion.rotations, betas, motion.trans, want_vertices=False)
-        if not known:
-            name = Path(motion.source).name
-            notes = (f"{name} names no joints; its shape is taken to be that of the embedded body (else give --body).",)
-    return Posed(body, betas, time, motion.rotations, motion.trans, joints), notes
-
-
-def measured_markers(result: str | Path) -> Markers | None:
-    """The markers that the result was solved from, what was filled in left out; None where they are not at hand."""
-    from solver.io.markers_in import load_markers
-
-    folder = Path(result) if Path(result).is_dir() else Path(result).parent
-    if not (folder / _MARKERS).is_file():
-        return None
-    markers = load_markers(folder / _MARKERS)
-    if markers.filled is None:
-        return markers
-    return replace(markers, positions=np.where(markers.filled[..., None], np.nan, markers.positions))
+def _clocks(found: MotionFile, other: MotionFile) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    """The times of both; a file that has none is taken to start with the one that has."""
+    ours, theirs = times_of(found), times_of(other)
+    if found.time is not None and other.time is not None:
+        return ours, theirs, ()
+    start = float((ours if other.time is None else theirs)[0])
+    late, beside = (other, "result") if other.time is None else (found, "reference")
+    shifted = start + times_of(late)
+    name = Path(late.source).name
+    note = f"{name} has no times of its own and is taken to start with the {beside}, at {start:.2f} s."
+    return (ours, shifted, (note,)) if late is other else (shifted, theirs, (note,))
 
 
 def _to_surface(markers: Markers | None, motion: Posed, frames: np.ndarray, progress: Progress) -> float:
@@ -252,21 +185,9 @@ def _to_surface(markers: Markers | None, motion: Posed, frames: np.ndarray, prog
 
 
 def _angles(ours: Posed, theirs: Posed) -> dict[str, metrics.AngleDifference]:
-    """Both sides' angles by the same definition, each on its own body's landmarks."""
-    from solver.angles import AngleSettings, joint_angles
-
-    tables = []
-    for motion in (ours, theirs):
-        found = joint_angles(
-            motion.time,
-            motion.rotations,
-            motion.body.landmarks(motion.betas),
-            motion.body.joints(motion.betas),
-            AngleSettings(),
-        )
-        values = np.radians(np.where(found.singular, np.nan, found.degrees))
-        tables.append(dict(zip(found.names, values.T, strict=True)))
-    return {name: metrics.angle_difference(tables[0][name], tables[1][name]) for name in tables[0]}
+    """Both sides' angles by the same definition."""
+    found, reference = angles_of(ours), angles_of(theirs)
+    return {name: metrics.angle_difference(found[name], reference[name]) for name in found}
 
 
 def summary_of(found: Evaluation) -> dict[str, object]:
@@ -280,16 +201,30 @@ def summary_of(found: Evaluation) -> dict[str, object]:
         "m2s_mm": 1000 * found.m2s,
         "m2s_reference_mm": 1000 * found.m2s_reference,
         "joints_mm": {name: 1000 * float(e) for name, e in zip(JOINTS, found.mpjpe.per_point, strict=True)},
-        "angles_deg": {
-            name: {
-                "rmse": float(np.degrees(a.rmse)),
-                "rmse_less_offset": float(np.degrees(a.rmse_less_offset)),
-                "offset": float(np.degrees(a.offset)),
-                "share": a.share,
-            }
-            for name, a in found.angles.items()
-        },
+        "angles_deg": angles_in_degrees(found.angles),
     }
+
+
+def angles_in_degrees(angles: Mapping[str, metrics.AngleDifference]) -> dict[str, dict[str, float]]:
+    """Plain values of compared angles."""
+    return {
+        name: {
+            "rmse": float(np.degrees(a.rmse)),
+            "rmse_less_offset": float(np.degrees(a.rmse_less_offset)),
+            "offset": float(np.degrees(a.offset)),
+            "share": a.share,
+        }
+        for name, a in angles.items()
+    }
+
+
+def angle_lines(angles: Mapping[str, metrics.AngleDifference]) -> tuple[str, ...]:
+    """The same for a person; angles that could not be compared are passed over."""
+    return tuple(
+        f"{name}: {np.degrees(a.rmse):.1f} degrees RMSE, {np.degrees(a.rmse_less_offset):.1f} less offset."
+        for name, a in angles.items()
+        if np.isfinite(a.rmse)
+    )
 
 
 def lines_of(found: Evaluation) -> tuple[str, ...]:
@@ -306,8 +241,4 @@ def lines_of(found: Evaluation) -> tuple[str, ...]:
         lines.append(f"Surface (V2V): {mm * found.v2v.mean:.1f} mm.")
     if np.isfinite(found.m2s):
         lines.append(f"Markers to surface (m2s): {mm * found.m2s:.1f} mm, reference {mm * found.m2s_reference:.1f} mm.")
-    for name, a in found.angles.items():
-        if np.isfinite(a.rmse):
-            rmse, less = np.degrees(a.rmse), np.degrees(a.rmse_less_offset)
-            lines.append(f"{name}: {rmse:.1f} degrees RMSE, {less:.1f} less offset.")
-    return tuple(lines)
+    return (*lines, *angle_lines(found.angles))

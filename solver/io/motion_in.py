@@ -10,13 +10,13 @@ import numpy as np
 
 from solver.body.skeleton import JOINTS
 from solver.errors import InputError
-from solver.io.motion_layouts import as_amass
+from solver.io.motion_layouts import as_amass, model_of
 from solver.io.priors.track import numbers, rotations_from_vectors
 from solver.io.safe_pickle import load_untrusted
 
 MOTION = "motion.npz"
 _RATES = ("mocap_frame_rate", "mocap_framerate", "fps")
-_REMEDY = "use the folder that solve wrote, or an npz with 'poses', 'trans', 'betas' and 'mocap_frame_rate'"
+_REMEDY = "use the folder that solve wrote, a stageii.pkl, or an npz with 'poses', 'trans' and 'mocap_frame_rate'"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,8 @@ class MotionFile:
     rate : Hz
     time : (T,) s, None where the file does not say
     joints : (T, 24, 3) m, None where the file does not say
-    source : path of the npz
+    source : path of the file
+    model : the body model that a program names as its own, blank where it names none
     """
 
     rotations: np.ndarray
@@ -43,6 +44,7 @@ class MotionFile:
     time: np.ndarray | None
     joints: np.ndarray | None
     source: str
+    model: str = ""
 
 
 def read_motion(path: str | Path) -> MotionFile:
@@ -81,6 +83,7 @@ def read_motion(path: str | Path) -> MotionFile:
         time=time,
         joints=_optional(data, "joints", (count, len(JOINTS), 3), where),
         source=where,
+        model=model_of(data),
     )
 
 

@@ -19,6 +19,13 @@ def as_amass(data: dict[Any, Any]) -> dict[str, Any]:
     return named
 
 
+def model_of(data: dict[str, Any]) -> str:
+    """The body model that a file says its shape belongs to; blank where it does not say."""
+    name = data.get("surface_model_type", "")
+    named = str(name) if np.size(name) == 1 else ""
+    return named or ("smplx" if "fullpose" in data else "")
+
+
 def _stage_two(data: dict[str, Any]) -> dict[str, Any]:
     """MoSh++ and SOMA, ``*_stageii.pkl``: ``fullpose`` (T, 156 | 165), the rate among the details of the fit."""
     told = {**data, "poses": data["fullpose"]}

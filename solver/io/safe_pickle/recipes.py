@@ -22,6 +22,8 @@ _RENAMED = (
 )
 _DTYPE = re.compile(r"[<>=|]?([?bBhHiIlLqQefdgFDGOSUV]|[biufcSUVO]\d{1,6})")
 _SPARSE = re.compile(r"scipy\.sparse(\._?(csc|csr|coo))?")
+_OMEGACONF = re.compile(r"omegaconf\.(base|nodes|dictconfig|listconfig)")
+"""MoSh++ and SOMA keep their settings beside their results, as trees of these; they are passed over."""
 
 
 def canonical(name: Global) -> Global:
@@ -32,6 +34,8 @@ def canonical(name: Global) -> Global:
             module = new + module[len(old) :]
     if _SPARSE.fullmatch(module) and (match := re.fullmatch(r"(csc|csr|coo)_(matrix|array)", name.name)):
         return Global("scipy.sparse", match[1])
+    if _OMEGACONF.fullmatch(module):
+        return Global("omegaconf", "settings")
     found = Global(module, name.name)
     if found in _CALLS or found in _TOKENS:
         return found
@@ -202,6 +206,7 @@ _PLAIN_CALLS: dict[Global, Callable[..., Any]] = {
     Global("copyreg", "_reconstructor"): _reconstructor,
     Global("copyreg", "__newobj__"): _newobj,
     Global("chumpy.ch", "Ch"): _shell("chumpy"),
+    Global("omegaconf", "settings"): _shell("settings"),
     Global("torch._utils", "_rebuild_tensor"): tensor,
     Global("torch._utils", "_rebuild_tensor_v2"): tensor,
     Global("torch._utils", "_rebuild_tensor_v3"): tensor_v3,
@@ -215,6 +220,7 @@ _CALLS = _PLAIN_CALLS | {Global("scipy.sparse", layout): _shell("sparse", layout
 _TOKENS = (
     {Global("numpy", name) for name in ("ndarray", "memmap")}
     | {Global("builtins", name) for name in ("object", "dict", "list", "tuple", "int", "float", "str", "bool")}
+    | {Global("typing", "Any")}
     | {Global("torch", name) for name in (*STORAGES, *TORCH_DTYPES)}
     | {Global("torch.storage", name) for name in ("UntypedStorage", "TypedStorage", "_UntypedStorage")}
 )
@@ -225,4 +231,5 @@ _FINISHERS: dict[str, Callable[[Shell, Any, Context], Any]] = {
     "joblib": _finish_joblib,
     "sparse": lambda shell, state, _: sparse_from_state(shell.detail, _require(state, dict)),
     "chumpy": lambda _, state, __: _require(state, dict)["x"],
+    "settings": lambda *_: None,
 }
