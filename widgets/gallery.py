@@ -21,8 +21,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication, QWidget
 
-SETTLE_MS = 200
-"""How long a widget may take to come to rest before its picture is taken (what it defers to the event loop)."""
+SETTLE_MS, LONGEST_MS = 200, 5000
+"""How long a widget gets for what it defers to the event loop before its picture is taken, and how much longer at most
+where it, or a widget in it, has an attribute ``settled`` that is False."""
 
 
 def examples() -> dict[str, Callable[[], QWidget]]:
@@ -48,7 +49,7 @@ def take_shots(app: QApplication, names: Iterable[str], folder: Path, themes: It
             theme.apply(app, look, font_scale)
             widget = known[name]()
             widget.show()
-            _settle(app)
+            _settle(app, widget)
             picture = widget.grab()
             path = folder / f"{name}_{look}_{picture.devicePixelRatio():g}x.png"
             if not picture.save(str(path)):
@@ -96,13 +97,17 @@ def main(arguments: list[str] | None = None) -> int:
     return app.exec()
 
 
-def _settle(app: QApplication) -> None:
+def _settle(app: QApplication, widget: QWidget) -> None:
     from PySide6.QtCore import QEventLoop, QTimer
+    from PySide6.QtWidgets import QWidget
 
-    loop = QEventLoop()
-    QTimer.singleShot(SETTLE_MS, loop.quit)
-    loop.exec()
-    app.processEvents()
+    for _ in range(LONGEST_MS // SETTLE_MS):
+        loop = QEventLoop()
+        QTimer.singleShot(SETTLE_MS, loop.quit)
+        loop.exec()
+        app.processEvents()
+        if all(getattr(part, "settled", True) for part in [widget, *widget.findChildren(QWidget)]):
+            return
 
 
 if __name__ == "__main__":

@@ -8,7 +8,8 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from widgets import palette, theme
-from widgets.scene import ColourBar, Scene3D
+from widgets.scene import Camera, ColourBar, Scene3D
+from widgets.video import VideoView
 
 BODY_FILE = Path(__file__).parents[1] / "resources" / "body" / "anny_24.npz"
 
@@ -23,6 +24,13 @@ def made_up_body() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     vertices, joints = ((points - [0, low, 0]) @ upright.T for points in (vertices, joints))
     bones = np.stack([parents[1:], np.arange(1, len(parents))], axis=1)
     return vertices, faces, joints, bones
+
+
+def coarse_body() -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (V, 3) m z up and faces (F, 3) of the same body with a tenth of the vertices."""
+    with np.load(BODY_FILE, allow_pickle=False) as file:
+        kept, faces = file["lod_index"], file["lod_f"].astype(np.int64)
+    return made_up_body()[0][kept], faces
 
 
 def made_up_markers(vertices: np.ndarray, count: int = 48, seed: int = 4) -> tuple[np.ndarray, np.ndarray]:
@@ -111,4 +119,45 @@ def scene_ghosts() -> QWidget:
     return scene
 
 
-EXAMPLES = {"scene_clusters": scene_clusters, "scene_residuals": scene_residuals, "scene_ghosts": scene_ghosts}
+def video() -> QWidget:
+    """A made-up frame with landmarks, and markers, outline and bones projected into it."""
+    view = VideoView()
+    view.resize(960, 560)
+    vertices, _, joints, bones = made_up_body()
+    markers, _ = made_up_markers(vertices, 30)
+    camera = Camera().turned_to("isometric", -np.pi / 2).fitted(vertices, 1280 / 720, 1.3)
+    y, x = np.mgrid[0:720, 0:1280]
+    room = np.stack([120 + 60 * y / 720, 118 + 50 * y / 720, 112 + 40 * x / 1280], axis=-1)
+    room[((x // 80) + (y // 80)) % 2 == 0] *= 0.94
+    view.set_frame(room.astype(np.uint8), "Frame 124 of 450   4.133 s")
+
+    def seen(points: np.ndarray) -> np.ndarray:
+        return camera.project(points, 1280, 720)[0]
+
+    coarse, coarse_faces = coarse_body()
+    view.set_body(seen(coarse), coarse_faces)
+    view.set_skeleton(seen(joints), bones)
+    view.set_landmarks(seen(joints)[[1, 2, 4, 5, 7, 8, 16, 17, 18, 19, 20, 21]] + 6, np.array(_LINKS), _SURE)
+    view.set_markers(seen(markers), palette.categorical(len(markers)))
+    view.set_selected([4])
+    return view
+
+
+def video_missing() -> QWidget:
+    """No picture, and why."""
+    view = VideoView()
+    view.resize(480, 270)
+    view.set_frame(None, "The video ends at 14.9 s, before this frame of the markers.")
+    return view
+
+
+_LINKS = [[0, 2], [2, 4], [1, 3], [3, 5], [6, 8], [8, 10], [7, 9], [9, 11], [6, 7], [0, 1], [0, 6], [1, 7]]
+_SURE = np.linspace(0.15, 1.0, 12)
+
+EXAMPLES = {
+    "scene_clusters": scene_clusters,
+    "scene_residuals": scene_residuals,
+    "scene_ghosts": scene_ghosts,
+    "video": video,
+    "video_missing": video_missing,
+}

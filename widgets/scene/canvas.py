@@ -15,7 +15,7 @@ from widgets.scene.gl import SOFTWARE
 
 # Position of each lamp about the head of who looks (right, up, backwards) and its strength: a key from the upper
 # left, a fill from the right, one from behind that lights the rim, and a little from straight ahead.
-_LAMPS = (((-0.55, 0.75, 0.9), 0.66), ((0.95, 0.15, 0.55), 0.30), ((0.25, 0.55, -1.0), 0.30), ((0.0, 0.0, 1.0), 0.20))
+_LAMPS = (((-0.55, 0.75, 0.9), 0.62), ((0.95, 0.15, 0.55), 0.36), ((0.25, 0.55, -1.0), 0.30), ((0.0, 0.0, 1.0), 0.36))
 # Sub-pixel shifts whose mean smooths edges: a regular grid turned by atan(1/2), so that no two share a row or column.
 JITTER = np.array([[-3, -1], [1, -3], [3, 1], [-1, 3], [-1, -1], [1, 1], [-3, 3], [3, -3]]) / 8.0
 _FAR = 80.0  # m

@@ -56,18 +56,18 @@ class Floor:
         return np.array(a)[order], np.array(b)[order], np.array(colours, dtype=np.uint8)[order]
 
     def ticks(self, camera: Camera, width: float, height: float) -> tuple[np.ndarray, list[str]]:
-        """Pixels (n, 2) and texts of the numbers in a picture of this size.
+        """Places (n, 3) m and texts of the numbers in a picture of this size.
 
         They stand along one line in x and one in y: of the lines at whole metres the nearest to the camera on which at
         least three numbers are seen, so that there are numbers however near one looks.
         """
-        pixels, texts = [], []
+        chosen, texts = [], []
         eye = camera.position()
         for axis in (0, 1):
             other = 1 - axis
             values = np.arange(self.low[axis], self.high[axis] + 1)
-            words = [f"{value}" for value in values]
-            words[-1 if len(words) < 3 else -2] += f" m {'xy'[axis]}"
+            words = [f"{value}".replace("-", "\u2212") for value in values]
+            words = [f"{'xy'[axis]} = {word} m" if k == len(values) - 2 else word for k, word in enumerate(words)]
             best, most = None, 0
             nearest_first = sorted(
                 range(self.low[other], self.high[other] + 1), key=lambda edge: abs(eye[other] - edge)
@@ -80,10 +80,10 @@ class Floor:
                 with np.errstate(invalid="ignore"):
                     seen = int(((at > 8) & (at < [width - 8, height - 8])).all(axis=1).sum())
                 if seen > most:
-                    best, most = at, seen
+                    best, most = places, seen
                 if seen >= 3:
                     break
             if best is not None:
-                pixels.append(best)
+                chosen.append(best)
                 texts += words
-        return np.concatenate([np.zeros((0, 2)), *pixels]), texts
+        return np.concatenate([np.zeros((0, 3)), *chosen]), texts

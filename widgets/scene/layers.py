@@ -116,7 +116,7 @@ class MeshLayer(Layer):
         super().__init__()
         surface = self.actor.GetProperty()
         surface.SetInterpolationToPhong()
-        surface.SetAmbient(0.14)
+        surface.SetAmbient(0.20)
         surface.SetDiffuse(0.86)
         surface.SetSpecular(0.10)
         surface.SetSpecularPower(16)
@@ -156,7 +156,7 @@ class MeshLayer(Layer):
             surface.SetColor(*(colour[:3] / 255.0))
         self.opacity = float(min(opacity, 1.0))
         surface.SetOpacity(self.opacity)
-        self._fill(True, np.stack([vertices.min(axis=0), vertices.max(axis=0)]) if len(vertices) > 5000 else vertices)
+        self._fill(True, vertices[:: max(1, len(vertices) // 1500)])
 
 
 class BoneLayer(Layer):
@@ -195,10 +195,10 @@ class LineLayer(Layer):
     def __init__(self) -> None:
         super().__init__()
         self.actor.GetProperty().LightingOff()
-        self.actor.ForceOpaqueOn()  # blended all the same, but before the skins
+        self.actor.ForceOpaqueOn()
 
     def set(self, a: np.ndarray | None, b: np.ndarray | None, colours: np.ndarray) -> None:
-        """From (N, 3) to (N, 3) m, NaN left out; a colour (3 or 4) or one a line (N, 3 or 4) uint8."""
+        """From (N, 3) to (N, 3) m, NaN left out; a colour (3) or one a line (N, 3) uint8."""
         if a is None or b is None or not len(a):
             self._fill(False)
             return
@@ -206,7 +206,7 @@ class LineLayer(Layer):
         if known.any():
             ends = np.stack([a[known], b[known]], axis=1).reshape(-1, 3)
             colours = np.asarray(colours, dtype=np.uint8)
-            colours = np.broadcast_to(colours, (len(known), colours.shape[-1]))[known]
+            colours = np.broadcast_to(colours, (len(known), 3))[known]
             self.geometry.set_points(ends)
             self.geometry.set_cells(np.arange(len(ends)).reshape(-1, 2), "lines")
             self.geometry.set_colours(np.repeat(colours, 2, axis=0))
@@ -217,13 +217,15 @@ class LineLayer(Layer):
         self.actor.GetProperty().SetLineWidth(pixels)
 
 
-def trail_lines(trails: np.ndarray, colours: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pieces (n, 3) to (n, 3) m of trails (k, M, 3), oldest first, with colours (n, 4) that fade with age."""
+def trail_lines(
+    trails: np.ndarray, colours: np.ndarray, old: tuple[int, int, int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pieces (n, 3) to (n, 3) m of trails (k, M, 3), oldest first, with colours (n, 3) that fade to ``old``."""
     a, b = trails[:-1].reshape(-1, 3), trails[1:].reshape(-1, 3)
     steps, count = max(len(trails) - 1, 0), trails.shape[1]
-    fade = np.repeat(np.linspace(0.12, 0.9, steps) * 255, count)
-    faded = np.concatenate([np.tile(colours[:, :3], (steps, 1)), fade[:, None]], axis=1).astype(np.uint8)
-    return a, b, faded
+    young = np.repeat(np.linspace(0.0, 1.0, steps), count)[:, None]
+    faded = young * np.tile(colours[:, :3], (steps, 1)) + (1 - young) * np.array(old)
+    return a, b, faded.astype(np.uint8)
 
 
 def _pyramids(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -62,6 +62,10 @@ class Places:
     def __init__(self, taken: Sequence[QRectF] = ()) -> None:
         self._boxes = np.array([(r.left(), r.top(), r.right(), r.bottom()) for r in taken], dtype=float).reshape(-1, 4)
 
+    def hold(self, left: float, top: float, width: float, height: float) -> None:
+        """Take a box whether or not a part of it is taken."""
+        self._boxes = np.concatenate([self._boxes, [[left, top, left + width, top + height]]])
+
     def take(self, left: float, top: float, width: float, height: float) -> bool:
         """Take a box unless a part of it is taken."""
         box = np.array([left, top, left + width, top + height])

@@ -58,7 +58,10 @@ class Sheet:
         if stage.shows("markers"):
             self._markers(painter, stage, camera, size, places)
         if stage.floor is not None and stage.shows("floor"):
-            draw_ticks(painter, self._words, places, *stage.floor.ticks(camera, width, height), look)
+            points, texts = stage.floor.ticks(camera, width, height)
+            pixels, depth = camera.project(points, width, height)
+            pixels[stage.covers(camera, pixels, depth, size)] = np.nan
+            draw_ticks(painter, self._words, places, pixels, texts, look)
         if stage.shows("axes"):
             draw_axes(painter, self._words, camera, QPointF(44, height - 42), look)
         if band is not None:
@@ -76,6 +79,8 @@ class Sheet:
         draw_rings(painter, pixels[hovered], radius + 3.5, look.text, look)
         if not self.labels:
             return
+        for x, y in pixels[np.isfinite(pixels[:, 0])]:
+            places.hold(x - 0.8 * radius, y - 0.8 * radius, 1.6 * radius, 1.6 * radius)
         first = hovered + [i for i in chosen if i not in hovered]
         rest = [i for i in range(len(pixels)) if i not in set(first)] if stage.shows("labels") else []
         plain, bold = QFont(painter.font()), QFont(painter.font())

@@ -23,6 +23,7 @@ from widgets.scene.layers import (
 from widgets.theme import Colours
 
 _Kind = TypeVar("_Kind", bound=Layer)
+_COVER_PX = 12.0  # a skin's points, thinned, lie about as far apart
 OVERLAYS = ("labels", "axes", "legend")
 """Layers that are painted over the picture; those of the picture are named by whoever fills them."""
 
@@ -78,9 +79,9 @@ class Stage:
     def set_trails(self, trails: np.ndarray | None) -> None:
         """Where the markers were, (k, M, 3) m, oldest first, in the markers' colours."""
         if trails is None or len(trails) < 2:
-            self._trails.set(None, None, np.zeros((0, 4)))
+            self._trails.set(None, None, np.zeros((0, 3)))
         else:
-            self._trails.set(*trail_lines(np.asarray(trails, dtype=float), self.colours))
+            self._trails.set(*trail_lines(np.asarray(trails, dtype=float), self.colours, self._look.floor))
 
     def set_mesh(
         self, name: str, vertices: np.ndarray | None, faces: np.ndarray, colour: np.ndarray, opacity: float
@@ -130,6 +131,14 @@ class Stage:
         """(N, 3) m that a picture of everything that is seen must show; the floor is no part of it."""
         seen = [layer.extent for layer in self._layers.values() if layer.visible and layer is not self._floor]
         return np.concatenate([np.zeros((0, 3)), *seen])
+
+    def covers(self, camera: Camera, pixels: np.ndarray, depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+        """(n) bool: whether a skin lies before what is seen at pixels (n, 2) at a depth (n) m."""
+        skins = [layer for layer in self._layers.values() if isinstance(layer, MeshLayer) and layer.visible]
+        points = np.concatenate([np.zeros((0, 3)), *[layer.extent for layer in skins if layer.opacity > 0.2]])
+        at, before = camera.project(points, *size)
+        near = np.abs(pixels[:, None] - at).max(axis=2) < _COVER_PX
+        return np.asarray((near & (before < depth[:, None] - 0.02)).any(axis=1))
 
     def picture(self, camera: Camera, size: tuple[int, int], ratio: float, smooth: bool) -> np.ndarray:
         """The scene (H, W, 4) uint8 for ``size`` (width, height), each of whose pixels is ``ratio`` pixels wide."""

@@ -270,6 +270,11 @@ class Scene3D(QWidget):
         """Why nothing is drawn on this machine and what to do; None where all is well."""
         return self._stage.problem
 
+    @property
+    def settled(self) -> bool:
+        """Whether what is on the screen is as good as it gets."""
+        return self._stage.problem is not None or not (self._dirty or self._rest.isActive())
+
     def image(self, scale: float = 1.0, size: tuple[int, int] | None = None) -> QImage:
         """What is seen, with smoothed edges, at ``scale`` times the screen's pixels, or for another ``size``."""
         width, height = size or (self.width(), self.height())

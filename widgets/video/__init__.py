@@ -1,0 +1,5 @@
+"""The video."""
+
+from widgets.video.view import LAYERS, VideoView
+
+__all__ = ["LAYERS", "VideoView"]
