@@ -89,6 +89,29 @@ def announced(path: str | Path) -> tuple[float, int]:
         return decoder.nominal, decoder.announced
 
 
+def read_near(path: str | Path, time: float) -> tuple[float, np.ndarray]:
+    """The frame nearest to a time of a video that has not been indexed: ``(time in s, upright picture)``.
+
+    Exact where the file has time stamps; what its number is only decoding all frames before it would tell.
+    """
+    with _Decoder(path) as decoder:
+        first = next(iter(decoder), None)
+        if first is None:
+            raise InputError("not one frame of the video decodes", path, _CONVERT)
+        frame, start, pts = first
+        best = frame, start
+        origin, unit = pts, decoder.unit
+        if pts != NO_STAMP and unit > 0:
+            decoder.seek(pts + round(time / unit))
+        for frame, since, pts in decoder:
+            here = (pts - origin) * unit if NO_STAMP not in (pts, origin) else since
+            if abs(here - time) < abs(best[1] - time):
+                best = frame, here
+            if here >= time:
+                break
+        return best[1], decoder.picture(best[0])
+
+
 class FrameReader:
     """Random access to the frames of an indexed video, exact by presentation stamp."""
 
@@ -176,6 +199,7 @@ class _Decoder:
         self._stream.thread_type = "AUTO"
         rate = self._stream.average_rate or self._stream.guessed_rate
         self.nominal = float(rate) if rate else 30.0
+        self.unit = float(self._stream.time_base or 0)
         self.announced = int(self._stream.frames)
         self._damaged = 0
         self._restamped = 0
@@ -201,7 +225,7 @@ class _Decoder:
     def __iter__(self) -> Iterator[tuple[VideoFrame, float, int]]:
         first: int | None = None
         time = -1.0 / self.nominal
-        unit = float(self._stream.time_base or 0)
+        unit = self.unit
         for frame in self._raw():
             pts, previous = frame.pts, time
             if first is None:
