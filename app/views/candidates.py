@@ -8,8 +8,10 @@ from typing import Literal
 
 import numpy as np
 
+from app.views.bodies import BodyTrack
 from app.views.colours import bone_name
 from solver.body.skeleton import subtrees
+from solver.markers import Markers
 from solver.solve.confidence import same_answer
 from solver.solve.paper.results import PaperLocalization
 from solver.solve.results import Localization, Orientation
@@ -134,6 +136,14 @@ def coverage(points: np.ndarray, markers: np.ndarray, within: float = 0.03) -> f
     seen = np.isfinite(distance).sum(axis=0)
     near = (np.nan_to_num(distance, nan=np.inf) <= within).sum(axis=0)
     return float((near[seen > 0] >= 0.5 * seen[seen > 0]).mean()) if (seen > 0).any() else float("nan")
+
+
+def covered_by(track: BodyTrack, markers: Markers, most: int = 12) -> float:
+    """Share of a ghost's markers that are near their places, looked at in some of its keyframes."""
+    some = np.unique(np.linspace(0, len(track.times) - 1, min(len(track.times), most)).round().astype(int))
+    times = track.times[some]
+    frames = np.round((times - markers.first_time) * markers.rate).astype(int)
+    return coverage(track.places_over(times), markers.positions[frames][:, track.markers])
 
 
 def bone_names(bones: Sequence[int] | np.ndarray) -> tuple[str, ...]:

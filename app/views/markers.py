@@ -86,9 +86,19 @@ def _residuals(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
     frame = np.full(width, -1)
     for m in range(width):
         column = residual[:, m]
-        known = column[np.isfinite(column)]
-        if len(known):
-            mean[m], p95[m] = 1000 * known.mean(), 1000 * np.percentile(known, 95)
-            frame[m] = int(np.nanargmax(column))
-            worst[m] = 1000 * column[frame[m]]
+        when = np.flatnonzero(np.isfinite(column))
+        if len(when):
+            known = 1000 * column[when]
+            top = int(known.argmax())
+            mean[m], worst[m], frame[m] = known.mean(), known[top], when[top]
+            p95[m] = _p95(known)
     return mean, p95, worst, frame
+
+
+def _p95(values: np.ndarray) -> float:
+    """As ``np.percentile`` has it, by one partial sort."""
+    place = 0.95 * (len(values) - 1)
+    low = int(place)
+    high = min(low + 1, len(values) - 1)
+    ranked = np.partition(values, (low, high))
+    return float(ranked[low] + (place - low) * (ranked[high] - ranked[low]))

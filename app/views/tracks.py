@@ -73,14 +73,20 @@ def tracks_of(markers: Markers, motion: FittedMotion | None = None, measured: Ma
     motion : a fit of the same frames, to stand in where markers are lost
     measured : the same trajectories before cleaning, to tell which samples were taken out
     """
-    present = markers.present
-    state = np.where(present, MEASURED, LOST).astype(np.uint8)
+    present = _present(markers)
+    state = np.where(present, np.uint8(MEASURED), np.uint8(LOST))
     if markers.filled is not None:
         state[markers.filled & present] = FILLED
     if measured is not None:
-        was = measured.present if measured.filled is None else measured.present & ~measured.filled
+        was = _present(measured) if measured.filled is None else _present(measured) & ~measured.filled
         state[was & (state != MEASURED)] = OUTLIER
     return MarkerTracks(markers, state, None if motion is None else motion.placed)
+
+
+def _present(markers: Markers) -> np.ndarray:
+    """(T, M) ``Markers.present``, several times as fast over a long recording."""
+    x, y, z = np.moveaxis(markers.positions, 2, 0)
+    return np.isfinite(x) & np.isfinite(y) & np.isfinite(z)
 
 
 def pooled(states: np.ndarray, most: int) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.views import bodies
-from app.views.candidates import FATES, CandidateTable, bone_names, candidate_table, coverage
+from app.views.candidates import FATES, CandidateTable, bone_names, candidate_table, coverage, covered_by
 from app.views.convergence import of_orientation, of_paper
 from app.views.hypotheses import hypotheses_picture
 from solver.body.model import Body
@@ -122,6 +122,7 @@ def test_the_best_candidates_ghost_covers_the_markers(results: Mapping[str, Any]
     distance = np.nanmedian(np.linalg.norm(places - measured, axis=2))
     assert distance < 0.02, f"{1000 * distance:.1f} mm"
     assert coverage(places, measured) > 0.9
+    assert abs(covered_by(ghost, markers) - coverage(places, measured)) < 0.1
     worst = bodies.of_candidate(body, ranked.candidates[-1], found, markers)
     assert coverage(worst.places_over(worst.times), measured[: len(worst.times)]) < 1.0
 
