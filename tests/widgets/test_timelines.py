@@ -277,3 +277,19 @@ def test_ticks_are_round() -> None:
     log = Scale(1e-2, 1e3, 0, 100, log=True)
     assert log.at(10) == pytest.approx(60)
     assert log.value(60) == pytest.approx(10)
+
+
+def test_strips_in_another_order_are_told_by_their_markers(qapp: QApplication) -> None:
+    made, found = Timelines(), []
+    made.resize(600, 200)
+    made.set_span(0, 10)
+    made.set_rows([PresenceRow("Markers", TIME, np.ones((1000, 3), bool), markers=np.array([2, 0, 1]))])
+    made.show()
+    made.row_clicked.connect(lambda name, time, index: found.append(index))
+    QTest.mouseClick(made.rows, Qt.MouseButton.LeftButton, pos=point(made, "Markers", 5.0, 1 / 6))
+    assert found == [2]
+    before = pixels(made.rows)
+    made.set_selected([2])
+    changed = np.flatnonzero((np.abs(pixels(made.rows).astype(int) - before).max(axis=2) > 30).any(axis=1))
+    assert changed.max() <= made.rows.area_of("Markers").top() + made.rows.area_of("Markers").height() / 3 + 2
+    made.close()

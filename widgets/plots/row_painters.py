@@ -44,6 +44,7 @@ class PresencePainter:
     def __init__(self, row: PresenceRow) -> None:
         self.row = row
         self.markers = row.present.shape[1]
+        self.numbers = np.arange(self.markers) if row.markers is None else np.asarray(row.markers)
         self.present = Counts(row.present)
         self.filled = None if row.filled is None else Counts(row.filled)
         self.outlier = None if row.outlier is None else Counts(row.outlier)
@@ -78,7 +79,7 @@ class PresencePainter:
                 painter.drawLine(QPointF(area.left(), y), QPointF(area.right(), y))
         painter.setPen(pen(palette.SELECTED, 1.5))
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        for low, high in runs(np.isin(np.arange(self.markers), list(selected))):
+        for low, high in runs(np.isin(self.numbers, list(selected))):
             painter.drawRect(QRectF(area.left() + 1, area.top() + low * strip, area.width() - 2, (high - low) * strip))
         self._paint_key(painter, area, np.array(look.accent) if self.row.colours is None else self.row.colours[0])
 
@@ -106,12 +107,12 @@ class PresencePainter:
 
     def index_at(self, time: float, y: float, area: QRectF) -> int:
         """Marker."""
-        index = int((y - area.top()) / max(area.height(), 1) * self.markers)
-        return index if 0 <= index < self.markers else -1
+        strip = self._strip(y, area)
+        return int(self.numbers[strip]) if strip >= 0 else -1
 
     def tip(self, time: float, y: float, area: QRectF) -> str:
         """Marker, and what was there."""
-        index = self.index_at(time, y, area)
+        index = self._strip(y, area)
         if index < 0 or not len(self.row.time):
             return self.row.help
         frame = frame_at(self.row.time, time)
@@ -122,6 +123,10 @@ class PresencePainter:
             what = "taken out as an outlier"
         name = self.row.labels[index] if index < len(self.row.labels) else f"marker {index}"
         return f"{name}: {what} at {clock(time)}, seen in {100 * self.row.present[:, index].mean():.0f} % of all frames"
+
+    def _strip(self, y: float, area: QRectF) -> int:
+        index = int((y - area.top()) / max(area.height(), 1) * self.markers)
+        return index if 0 <= index < self.markers else -1
 
 
 class StatePainter:

@@ -19,8 +19,9 @@ class PresenceRow:
     filled : (T, M) True where a gap was filled, None if nothing was
     outlier : (T, M) True where a point was taken out, None if none was
     colours : (M, 3) uint8 of the strips, None for one colour
-    labels : of the markers, for the tooltip
+    labels : of the strips, for the tooltip
     help : what the row means
+    markers : (M,) the marker that each strip shows, by which signals and selections go; None if strip k is marker k
     """
 
     name: str
@@ -31,6 +32,7 @@ class PresenceRow:
     colours: np.ndarray | None = None
     labels: tuple[str, ...] = ()
     help: str = ""
+    markers: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,172 @@
+"""The chains of bones that the groups could be, ranked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QButtonGroup,
+    QHBoxLayout,
+    QPushButton,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from widgets.icons import icon
+from widgets.tables.array_table import ArrayTable
+from widgets.tables.columns import Column
+
+
+@dataclass(frozen=True)
+class CandidateRecord:
+    """A candidate; any object with these attributes will do.
+
+    Attributes
+    ----------
+    part : the bones that carry markers, in words
+    fate : how far it got
+    yaw_deg, heading_deg : degrees, the yaw it started from, and which way it ended up; NaN if there is none
+    distance : mm, from the markers to the body as first laid over them; NaN if it was not
+    score : what it is ranked by; NaN if not scored
+    margin : score over that of the best
+    covered : share 0..1 of the markers that it explains
+    same_as_first : whether it is the first candidate's answer found once more
+    in_use : whether the fit goes on from it
+    """
+
+    part: str
+    fate: str
+    yaw_deg: float = float("nan")
+    heading_deg: float = float("nan")
+    distance: float = float("nan")
+    score: float = float("nan")
+    margin: float = float("nan")
+    covered: float = float("nan")
+    same_as_first: bool = False
+    in_use: bool = False
+
+
+@dataclass(frozen=True)
+class SearchStep:
+    """A step of the search, by its name, meaning and rows; any object with these attributes will do."""
+
+    name: str
+    help: str
+    rows: tuple[int, ...]
+
+
+def candidate_columns(
+    rows: Sequence[Any], score: str = "Score", unit: str = "", colours: np.ndarray | None = None
+) -> list[Column]:
+    """The table of candidates, given what they are ranked by; ``colours`` (N, 3) uint8 are those of their ghosts."""
+
+    def figures(name: str, factor: float = 1.0) -> np.ndarray:
+        return factor * np.array([getattr(row, name) for row in rows], float)
+
+    states = [f"{row.fate}, same as 1" if row.same_as_first else row.fate for row in rows]
+    states = [f"{state}, in use" if row.in_use else state for state, row in zip(states, rows)]
+    return [
+        Column("Rank", np.arange(1, len(rows) + 1), tooltip="Place, the best first", colours=colours),
+        Column("Bones", [row.part for row in rows], tooltip="The part of the body that the groups are taken for"),
+        Column(score, figures("score"), unit, "#.3g", "What the candidates are ranked by, the least first"),
+        Column("Margin", figures("margin"), "× best", ".2f", "Score over that of the best: near 1 they tie"),
+        Column("Distance", figures("distance"), "mm", ".0f", "From the markers to the body as first laid over them"),
+        Column("Yaw", figures("yaw_deg"), "deg", ".0f", "About the vertical axis, as it was started"),
+        Column("Heading", figures("heading_deg"), "deg", ".0f", "Which way it ended up, about the vertical axis"),
+        Column("Markers", figures("covered", 100), "%", ".0f", "Share of the markers that it explains", bar=(0, 100)),
+        Column("State", states, tooltip="How far the search took it"),
+    ]
+
+
+class CandidateTable(QWidget):
+    """A table that fills while the search runs, and buttons for its steps.
+
+    Signals
+    -------
+    row_selected(row), row_activated(row), pin_requested(row) : as of :class:`ArrayTable`
+    step_chosen(name) : show what the search had after this step
+    """
+
+    row_selected = Signal(int)
+    row_activated = Signal(int)
+    pin_requested = Signal(int)
+    step_chosen = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Candidates")
+        self.table = ArrayTable("Candidates", can_pin=True)
+        self.pin_button = QPushButton(icon("pin"), "Pin")
+        self.pin_button.setToolTip("Hold this candidate, and go on from it; can be undone (P)")
+        self.pin_button.setEnabled(False)
+        self.pin_button.clicked.connect(lambda: self.pin_requested.emit(self.table.current_row()))
+        self.table.top.addWidget(self.pin_button)
+        self._steps = QHBoxLayout()
+        self._steps.setSpacing(4)
+        self._group = QButtonGroup(self)
+        self._group.buttonClicked.connect(self._choose)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addLayout(self._steps)
+        layout.addWidget(self.table, 1)
+        self.table.row_selected.connect(self.row_selected)
+        self.table.row_selected.connect(lambda row: self.pin_button.setEnabled(row >= 0))
+        self.table.row_activated.connect(self.row_activated)
+        self.table.pin_requested.connect(self.pin_requested)
+        self._known: tuple[Any, ...] = ()
+
+    def set_steps(self, steps: Sequence[Any], current: str = "") -> None:
+        """Offer the steps of the search; the rows of one are shown, all of them where ``current`` is none."""
+        if [step.name for step in steps] != [step.name for step in self._known]:
+            for old in self._group.buttons():
+                self._group.removeButton(old)
+                old.deleteLater()
+            while self._steps.takeAt(0) is not None:
+                pass
+            for step in steps:
+                button = QToolButton()
+                button.setCheckable(True)
+                button.setProperty("step", step.name)
+                self._group.addButton(button)
+                self._steps.addWidget(button)
+            self._steps.addStretch(1)
+        self._known = tuple(steps)
+        for made, step in zip(self._group.buttons(), steps):
+            made.setText(f"{step.name.capitalize()} ({len(step.rows)})")
+            made.setToolTip(step.help)
+            made.setChecked(step.name == current)
+        self._keep(current)
+
+    def step_buttons(self) -> list[QAbstractButton]:
+        """One a step."""
+        return list(self._group.buttons())
+
+    def set_rows(
+        self,
+        rows: Sequence[Any],
+        pinned: int = -1,
+        score: str = "Score",
+        unit: str = "",
+        colours: np.ndarray | None = None,
+    ) -> None:
+        """Show candidates, see :func:`candidate_columns`; more may come while the search runs."""
+        self.table.set_columns(candidate_columns(rows, score, unit, colours), pinned)
+
+    def _keep(self, name: str) -> None:
+        kept = next((step.rows for step in self._known if step.name == name), None)
+        self.table.set_kept(None if kept is None else frozenset(kept))
+
+    def _choose(self, button: QAbstractButton) -> None:
+        self._keep(button.property("step"))
+        self.step_chosen.emit(button.property("step"))
+
+    def set_selected(self, row: int) -> None:
+        """Select a row, -1 for none; nothing is emitted."""
+        self.table.set_selected([row] if row >= 0 else [])
+        self.pin_button.setEnabled(row >= 0)
