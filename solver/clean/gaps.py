@@ -118,7 +118,7 @@ def find_gaps(present: np.ndarray) -> list[Gap]:
     change = np.diff(padded, axis=1)
     marker, first = np.nonzero(change == 1)
     _, after = np.nonzero(change == -1)
-    ever = present.any(axis=0)
+    ever = np.asarray(present.any(axis=0))
     return [Gap(int(m), int(f), int(a) - 1) for m, f, a in zip(marker, first, after) if ever[m]]
 
 

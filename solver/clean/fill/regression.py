@@ -101,8 +101,8 @@ def _round(scene: _Scene, gaps: list[Gap], most: int) -> Parts:
         group = scene.near.nearest(gap.marker, throughout(scene.known, gap), most)
         alike[gap.marker, tuple(group)].append(gap)
     found: Parts = {}
-    for (marker, group), members in alike.items():
-        local = _local(scene, marker, np.array(group), members) if len(group) >= FEWEST else None
+    for (marker, others), members in alike.items():
+        local = _local(scene, marker, np.array(others), members) if len(others) >= FEWEST else None
         if local is not None:
             found |= _predicted(scene, local, marker, members)
     return found

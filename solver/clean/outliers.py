@@ -1,0 +1,170 @@
+"""Samples that jump out of their track."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+OutlierMethod = Literal["local", "prominence", "none"]
+
+_FLOOR_M = 0.0003
+"""Below this nothing is out of the ordinary, however still the marker was."""
+_AGREE = 0.5
+"""Of a jump: the way back may differ from the way out by this share, and what is between may move by as much."""
+_SMOOTH = 7
+"""Frames about one from which its usual velocity is taken."""
+_ROUNDS = 6
+
+
+@dataclass(frozen=True)
+class OutlierSettings:
+    """How outliers are found.
+
+    Attributes
+    ----------
+    method : ``local``: acceleration over its own local median; ``prominence``: peaks of acceleration, as published;
+        ``none``
+    ratio : local: how many times the usual acceleration there is too much
+    least : m, local: a sample this near to where its neighbours in time have it is never an outlier
+    window : s, local: over which the usual acceleration is taken
+    longest : frames, local: an excursion that comes back within so many is an outlier as a whole
+    prominence : m/s^2, of a published peak
+    around : frames cut to either side of a published peak
+    passes : of the published search
+    """
+
+    method: OutlierMethod = "local"
+    ratio: float = 7.0
+    least: float = 0.005
+    window: float = 0.5
+    longest: int = 5
+    prominence: float = 100.0
+    around: int = 2
+    passes: int = 2
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot work."""
+        for name in ("ratio", "least", "window", "prominence"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} is {getattr(self, name):g} and has to be above 0")
+        if self.around < 0 or self.passes < 1 or self.longest < 1:
+            raise ValueError("around has to be 0 or more, passes and longest 1 or more")
+
+
+def find_outliers(positions: np.ndarray, rate: float, settings: OutlierSettings) -> np.ndarray:
+    """Samples that are outliers, (T, M) True; never one that is lost.
+
+    Parameters
+    ----------
+    positions : (T, M, 3) m, NaN = lost
+    rate : Hz
+    """
+    found = np.zeros(positions.shape[:2], dtype=bool)
+    if settings.method == "prominence":
+        found = _by_prominence(positions, rate, settings)
+    elif settings.method == "local" and len(positions) > 2:
+        found = _excursions(positions, rate, settings)
+        found |= _peaks(_bridged(positions, found), rate, settings)
+    return np.asarray(found & np.isfinite(positions).all(axis=2))
+
+
+def _usual(size: np.ndarray, rate: float, settings: OutlierSettings) -> np.ndarray:
+    """(T, M) m, what is usual there: the marker's median about that time, and all markers' in that frame.
+
+    The second is what tells a landing, which all markers feel, from a marker that jumps alone.
+    """
+    from scipy.ndimage import median_filter
+
+    # An even number of frames would look further back than ahead.
+    window = max(3, round(settings.window * rate) // 2 * 2 + 1)
+    own: np.ndarray = median_filter(np.nan_to_num(size), size=(window, 1), mode="nearest")
+    return own + _median_of_frame(size)[:, None] + _FLOOR_M
+
+
+def _median_of_frame(size: np.ndarray) -> np.ndarray:
+    """(T,) median over the markers, 0 where all are NaN."""
+    count = np.isfinite(size).sum(axis=1)
+    rising = np.sort(size, axis=1)  # NaN last
+    return np.where(count > 0, np.nan_to_num(rising[np.arange(len(size)), np.maximum(count - 1, 0) // 2]), 0.0)
+
+
+def _peaks(positions: np.ndarray, rate: float, settings: OutlierSettings) -> np.ndarray:
+    """Single samples: peaks of the distance from the middle of the samples before and after."""
+    positions = positions.copy()
+    found = np.zeros(positions.shape[:2], dtype=bool)
+    usual: np.ndarray | None = None
+    for _ in range(_ROUNDS):
+        size = np.full(found.shape, np.nan)
+        size[1:-1] = np.linalg.norm(positions[1:-1] - 0.5 * (positions[:-2] + positions[2:]), axis=2)
+        usual = _usual(size, rate, settings) if usual is None else usual
+        size = np.nan_to_num(size)
+        # The samples beside an outlier have half its acceleration: only the top of each peak is cut.
+        padded = np.pad(size, ((2, 2), (0, 0)))
+        top = np.max([padded[k : k + len(size)] for k in (0, 1, 3, 4)], axis=0)
+        new = (size > settings.ratio * usual) & (size > settings.least) & (size >= top)
+        if not new.any():
+            break
+        found |= new
+        frame, marker = np.nonzero(new)
+        positions[frame, marker] = 0.5 * (positions[frame - 1, marker] + positions[frame + 1, marker])
+    return found
+
+
+def _excursions(positions: np.ndarray, rate: float, settings: OutlierSettings) -> np.ndarray:
+    """Spans of two frames and more that a marker spends elsewhere: it jumps away, and by the same way back."""
+    from scipy.ndimage import median_filter
+
+    found = np.zeros(positions.shape[:2], dtype=bool)
+    step = np.diff(positions, axis=0)
+    jump = step - median_filter(np.nan_to_num(step), size=(_SMOOTH, 1, 1), mode="nearest")
+    size = np.linalg.norm(jump, axis=2)
+    usual = _usual(size, rate, settings)
+    jump, size = np.nan_to_num(jump), np.nan_to_num(size)
+    big = (size > settings.ratio * usual) & (size > settings.least)
+    for length in range(2, min(settings.longest, len(size) - 1) + 1):
+        smaller = _AGREE * np.minimum(size[:-length], size[length:])
+        returns = np.linalg.norm(jump[:-length] + jump[length:], axis=2) < smaller
+        between = np.max([size[k : len(size) - length + k] for k in range(1, length)], axis=0)
+        hit = big[:-length] & big[length:] & returns & (between < smaller)
+        for k in range(1, length + 1):
+            found[k : k + len(hit)] |= hit
+    return found
+
+
+def _by_prominence(positions: np.ndarray, rate: float, settings: OutlierSettings) -> np.ndarray:
+    """Peaks of acceleration by prominence and the frames about them, searched again after a spline replaced them."""
+    from scipy.signal import find_peaks
+
+    positions, present = positions.copy(), np.isfinite(positions).all(axis=2)
+    found = np.zeros(present.shape, dtype=bool)
+    for _ in range(settings.passes):
+        new = np.zeros_like(found)
+        pull = np.zeros(present.shape)
+        pull[1:-1] = np.linalg.norm(positions[2:] - 2 * positions[1:-1] + positions[:-2], axis=2) * rate**2
+        for m in range(present.shape[1]):
+            for peak in find_peaks(np.nan_to_num(pull[:, m]), prominence=settings.prominence)[0]:
+                new[max(0, peak - settings.around) : peak + settings.around + 1, m] = True
+        new &= present
+        found |= new
+        positions = _bridged(positions, new, spline=True)
+    return found
+
+
+def _bridged(positions: np.ndarray, out: np.ndarray, spline: bool = False) -> np.ndarray:
+    """The tracks with some samples replaced by a line, or a spline, through the others."""
+    from scipy.interpolate import CubicSpline
+
+    positions = positions.copy()
+    kept = np.isfinite(positions).all(axis=2) & ~out
+    for m in np.flatnonzero(out.any(axis=0)):
+        good, bad = np.flatnonzero(kept[:, m]), np.flatnonzero(out[:, m])
+        if len(good) < 2:
+            continue
+        bad = bad[(bad > good[0]) & (bad < good[-1])]
+        if spline:
+            positions[bad, m] = CubicSpline(good, positions[good, m], axis=0)(bad)
+        else:
+            positions[bad, m] = np.stack([np.interp(bad, good, positions[good, m, k]) for k in range(3)], axis=1)
+    return positions
