@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from solver.bench.ablations import ablations
+from solver.bench.imported import outside
 from solver.bench.methods import METHODS, Variant
 from solver.errors import InputError
 
@@ -10,12 +11,14 @@ VARIANTS: dict[str, Variant] = {variant.name: variant for variant in (*METHODS, 
 
 
 def method_named(name: str) -> Variant:
-    """The method of that name.
+    """The method of that name, or the results in a folder: ``NAME=FOLDER``.
 
     Raises
     ------
     InputError : there is none
     """
+    if "=" in name:
+        return outside(name)
     if name not in VARIANTS:
         raise InputError(f'there is no method "{name}"', "--methods", f"use some of: {', '.join(VARIANTS)}")
     return VARIANTS[name]
