@@ -49,6 +49,7 @@ class CandidateRow:
     covered : share 0..1 of the markers that are near the body, see ``coverage``; NaN where nobody asked
     same_as_first : whether it is the first candidate's answer found once more
     in_use : whether the fit goes on from it
+    can_pin : whether the fit can be told to go on from it
     """
 
     pool: int
@@ -64,6 +65,7 @@ class CandidateRow:
     covered: float = float("nan")
     same_as_first: bool = False
     in_use: bool = False
+    can_pin: bool = False
 
 
 @dataclass(frozen=True)
@@ -176,7 +178,8 @@ def _of_hypotheses(
         )
         rows.append(row if ranked is None or h not in place else _relaxed(row, ranked))
     if ranked is not None:
-        rows.sort(key=lambda row: row.candidate if row.candidate >= 0 else len(rows))
+        last = len(rows)
+        rows.sort(key=lambda row: row.candidate if row.candidate >= 0 else last)
     relaxed = [i for i, row in enumerate(rows) if row.fate != "found"]
     refined = [i for i in relaxed if rows[i].fate in ("refined", "merged")]
     ends = [i for i in refined if rows[i].fate == "refined"]
@@ -201,6 +204,7 @@ def _relaxed(row: CandidateRow, ranked: Orientation) -> CandidateRow:
         heading_deg=own.heading_deg,
         score=own.energy,
         margin=own.energy / max(best.energy, 1e-12),
+        can_pin=True,
         same_as_first=row.candidate > 0 and own.refined and same_answer(ranked.candidates[0], own),
     )
 

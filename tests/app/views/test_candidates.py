@@ -43,7 +43,7 @@ def test_every_hypothesis_meets_its_fate(results: Mapping[str, Any]) -> None:
         if row.candidate >= 0:
             own = ranked.candidates[row.candidate]
             assert (row.pool, row.score, row.part) == (own.hypothesis, own.energy, own.part)
-            assert (row.fate == "refined") == own.refined
+            assert (row.fate == "refined") == own.refined and row.can_pin
         else:
             assert row.fate == "merged"
     sets = [set(rows_of(table, step.name)) for step in table.steps]
@@ -53,6 +53,15 @@ def test_every_hypothesis_meets_its_fate(results: Mapping[str, Any]) -> None:
     assert [row.candidate for row in table.rows if row.in_use] == [1]
     behind = [row for row in table.rows if row.fate == "left behind"]
     assert not behind or (behind[0].margin == 1.0 and all(row.margin >= 1 for row in behind))
+
+
+def test_what_ran_into_a_better_one_comes_last(results: Mapping[str, Any]) -> None:
+    found, ranked = results["localize"], results["orient"]
+    gone = ranked.candidates[1].hypothesis
+    fewer = replace(ranked, candidates=(ranked.candidates[0], *ranked.candidates[2:]))
+    table = candidate_table(found, fewer)
+    assert (table.rows[-1].pool, table.rows[-1].fate, table.rows[-1].candidate) == (gone, "merged", -1)
+    assert gone in rows_of(table, "Kept") and gone not in rows_of(table, "Refined")
 
 
 def test_headings_are_where_the_camera_looks(results: Mapping[str, Any]) -> None:
@@ -76,7 +85,8 @@ def test_chains_go_from_the_pool_to_the_scored(paper_results: Mapping[str, Any])
     assert scores == sorted(scores)
     assert np.isclose(scores[0], 1e6 * min(fit.chamfer for fit in found.candidates))
     for i in refined.rows:
-        assert paper_results["orient"].candidates[table.rows[i].candidate].refined
+        assert paper_results["orient"].candidates[table.rows[i].candidate].refined and table.rows[i].can_pin
+    assert not any(table.rows[i].can_pin for i in pool.rows), "a chain is no start of a fit"
     pinned = [row for row in table.rows if row.candidate >= 0]
     assert sorted(row.candidate for row in pinned) == list(range(len(paper_results["orient"].candidates)))
     for row in pinned:
