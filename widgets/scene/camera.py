@@ -60,9 +60,10 @@ class Camera:
         """Pixels (N, 2), y down from the upper left, NaN behind the camera, and depth (N) m, of points (N, 3)."""
         seen = (np.asarray(points, dtype=float).reshape(-1, 3) - self.target) @ self.basis().T
         depth = self.distance - seen[:, 2]
-        scale = self.focal_px(height) / (np.full_like(depth, self.distance) if self.parallel else depth)
-        behind = ~(depth > NEAREST / 2) & (not self.parallel)
-        scale[behind] = np.nan
+        if self.parallel:
+            scale = np.full_like(depth, self.focal_px(height) / self.distance)
+        else:
+            scale = self.focal_px(height) / np.where(depth > 0.5 * NEAREST, depth, np.nan)
         return np.stack([0.5 * width + scale * seen[:, 0], 0.5 * height - scale * seen[:, 1]], axis=1), depth
 
     def orbited(self, right: float, up: float) -> Camera:
