@@ -26,14 +26,16 @@ def heavy_tailed_gaps(shape: tuple[int, int], share: float, longest: int, rng: n
     chance = (lengths + 0.6) ** -1.4
     chance /= chance.sum()
     prone = rng.gamma(0.7, size=count) + 0.02
+    gone, most = np.zeros(count), frames * min(0.95, 3 * share + 0.1)
     while wanted > 0:
         # A marker that is hardly seen any more is spared, else the chosen few would be lost for good.
-        free = prone * (lost.mean(axis=0) < min(0.95, 3 * share + 0.1))
+        free = prone * (gone < most)
         marker, length = int(rng.choice(count, p=free / free.sum())), int(rng.choice(lengths, p=chance))
         start = int(rng.integers(1 - length, frames))
         gap = np.arange(max(start, 0), min(start + length, frames))
         gap = gap[~lost[gap, marker]][:wanted]
         lost[gap, marker] = True
+        gone[marker] += len(gap)
         wanted -= len(gap)
     return lost
 

@@ -12,6 +12,7 @@ from solver.errors import InputError
 from solver.synth.motion import Motion
 
 _PER_BONE = 2  # markers that each bone of a part gets at least
+_FRAMES_AT_ONCE = 2000  # keeps what is posed at a time small
 _TRIES = 200  # points drawn for one marker before the skin counts as full
 
 
@@ -119,15 +120,17 @@ def _in_triangle(square: np.ndarray) -> np.ndarray:
 def site_paths(body: Body, betas: np.ndarray, motion: Motion, sites: Sites) -> np.ndarray:
     """(T, M, 3) m, markers that stick to the skin and stand out from it by their height."""
     lifted = replace(body, template=body.template + 0.01 * body.normals(betas), _torch={})
-    skin, above = (
-        np.einsum(
-            "mk,tmka->tma",
-            sites.shares,
-            np.asarray(b.pose(motion.rotations, betas, motion.trans, sites.corners.ravel())[0]).reshape(
-                len(motion.trans), -1, 3, 3
-            ),
-        )
-        for b in (body, lifted)
-    )
-    outward = above - skin  # shortened where blending pinches the skin
-    return skin + sites.height[:, None] * outward / np.linalg.norm(outward, axis=2, keepdims=True)
+
+    def points(of: Body, frames: slice) -> np.ndarray:
+        pose, place = motion.rotations[frames], motion.trans[frames]
+        skin = np.asarray(of.pose(pose, betas, place, sites.corners.ravel())[0])
+        return np.einsum("mk,tmka->tma", sites.shares, skin.reshape(len(place), -1, 3, 3))
+
+    found = np.empty((len(motion.trans), len(sites), 3))
+    for start in range(0, len(found), _FRAMES_AT_ONCE):
+        frames = slice(start, start + _FRAMES_AT_ONCE)
+        skin = points(body, frames)
+        outward = points(lifted, frames) - skin  # shortened where blending pinches the skin
+        outward /= np.linalg.norm(outward, axis=2, keepdims=True)
+        found[frames] = skin + sites.height[:, None] * outward
+    return found
