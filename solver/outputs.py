@@ -6,7 +6,7 @@ import json
 import os
 import secrets
 import shutil
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -28,6 +28,7 @@ from solver.pipeline.digest import canonical, file_digest
 from solver.pipeline.methods import graph_of
 from solver.pipeline.session import Session
 from solver.pipeline.stage import GraphRun
+from solver.report_data import Picture
 from solver.rotations import log_so3
 from solver.solve.results import FittedMotion
 
@@ -44,6 +45,20 @@ FILES = (
 """Written by every solve."""
 SOMETIMES = (CAMERA, "markers_labelled.filled.csv")
 """Written where there was a video, and where gaps were filled."""
+FORMATS = {
+    "angles": ("angles.csv", "angles.json"),
+    "angles_long": ("angles_long.csv", "angles.json"),
+    "mot": ("angles.mot",),
+    "c3d": ("markers_labelled.c3d",),
+    "trc": ("markers_labelled.trc", "markers_labelled.filled.csv"),
+    "bvh": ("motion.bvh",),
+    "motion": ("motion.npz",),
+    "camera": (CAMERA,),
+    "report": ("report.html",),
+}
+"""The files of each format; a camera and filled points are not always there."""
+STANDARD = tuple(name for name in FORMATS if name != "angles_long")
+"""What a solve writes."""
 _STAMP = "outputs.json"
 
 
@@ -93,25 +108,66 @@ def _as_written(folder: Path, files: Any) -> bool:
 def _move(staging: Path, folder: Path, names: set[str]) -> None:
     """Put finished files in their places, and take away those of an earlier solve that this one has not."""
     for name in (*FILES, *SOMETIMES):
-        target = folder / name
-        try:
-            if name in names:
-                os.replace(staging / name, target)
-            else:
-                target.unlink(missing_ok=True)
-        except PermissionError as error:
-            raise InputError(
-                "cannot be replaced", target, "close the program that has it open, or choose another folder"
-            ) from error
-        except OSError as error:
-            raise cannot_write(target, error) from error
+        _replace(staging / name if name in names else None, folder / name)
 
 
-def _write(folder: Path, session: Session, graph: GraphRun, about: Mapping[str, Any]) -> None:
+def _replace(source: Path | None, target: Path) -> None:
+    """Put a file in another's place, or nothing."""
+    try:
+        if source is None:
+            target.unlink(missing_ok=True)
+        else:
+            os.replace(source, target)
+    except PermissionError as error:
+        raise InputError(
+            "cannot be replaced", target, "close the program that has it open, or choose another folder"
+        ) from error
+    except OSError as error:
+        raise cannot_write(target, error) from error
+
+
+def write_formats(
+    folder: Path,
+    session: Session,
+    graph: GraphRun,
+    formats: Collection[str],
+    pictures: Sequence[Picture] = (),
+) -> tuple[Path, ...]:
+    """Write some of the formats into any folder, all or none, and say which files these are.
+
+    Parameters
+    ----------
+    formats : names out of ``FORMATS``
+    pictures : for the report
+
+    Raises
+    ------
+    InputError : the file system refuses
+    """
+    make_folder(folder)
+    staging = make_folder(folder / f".tmp-{os.getpid()}-{secrets.token_hex(4)}")
+    try:
+        _write(staging, session, graph, provenance(session, graph), formats, pictures)
+        names = sorted(path.name for path in staging.iterdir())
+        for name in names:
+            _replace(staging / name, folder / name)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+    return tuple(folder / name for name in names)
+
+
+def _write(
+    folder: Path,
+    session: Session,
+    graph: GraphRun,
+    about: Mapping[str, Any],
+    formats: Collection[str] = STANDARD,
+    pictures: Sequence[Picture] = (),
+) -> None:
     from solver.angles import evidence
     from solver.body.bones import with_bone_lengths
     from solver.body.model import Body
-    from solver.io.export_angles import write_angles
+    from solver.io.export_angles import angles_long_csv, write_angles
     from solver.io.export_bvh import write_bvh
     from solver.io.export_c3d import write_c3d
     from solver.io.export_mot import write_mot
@@ -122,17 +178,26 @@ def _write(folder: Path, session: Session, graph: GraphRun, about: Mapping[str, 
     body_file = session.inputs.get("body_file")
     body = with_bone_lengths(Body.load(body_file.path if body_file else None))
     named = labelled(markers, motion)
-    write_angles(folder, angles, about, evidence(angles.convention, motion.marker_joint))
-    write_mot(folder / "angles.mot", angles.time, (angles.names, np.where(angles.singular, np.nan, angles.degrees)))
-    write_motion(folder / "motion.npz", markers, motion, body.betas_count)
-    if motion.camera.image_size != (0, 0):
+    if "angles" in formats or "angles_long" in formats:  # the long form, too, has its convention beside it
+        write_angles(folder, angles, about, evidence(angles.convention, motion.marker_joint))
+    if "angles_long" in formats:
+        write_text_atomic(folder / "angles_long.csv", angles_long_csv(angles))
+    if "mot" in formats:
+        write_mot(folder / "angles.mot", angles.time, (angles.names, np.where(angles.singular, np.nan, angles.degrees)))
+    if "motion" in formats:
+        write_motion(folder / "motion.npz", markers, motion, body.betas_count)
+    if "camera" in formats and motion.camera.image_size != (0, 0):
         write_camera(folder / CAMERA, motion.camera)
-    write_c3d(folder / "markers_labelled.c3d", named)
-    write_trc(folder / "markers_labelled.trc", named)
-    rest = body.joints(motion.betas)
-    offsets = np.concatenate([np.zeros((1, 3)), rest[1:] - rest[PARENTS[1:]]])
-    write_bvh(folder / "motion.bvh", JOINTS, PARENTS, offsets, motion.rotations, motion.joints[:, 0], markers.rate)
-    report_of(folder / "report.html", session, graph, named, about)
+    if "c3d" in formats:
+        write_c3d(folder / "markers_labelled.c3d", named)
+    if "trc" in formats:
+        write_trc(folder / "markers_labelled.trc", named)
+    if "bvh" in formats:
+        rest = body.joints(motion.betas)
+        offsets = np.concatenate([np.zeros((1, 3)), rest[1:] - rest[PARENTS[1:]]])
+        write_bvh(folder / "motion.bvh", JOINTS, PARENTS, offsets, motion.rotations, motion.joints[:, 0], markers.rate)
+    if "report" in formats:
+        report_of(folder / "report.html", session, graph, named, about, pictures)
 
 
 def write_motion(path: Path, markers: Markers, motion: FittedMotion, betas_count: int) -> None:

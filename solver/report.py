@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import math
 from pathlib import Path
 
@@ -38,6 +39,7 @@ def render(data: ReportData) -> str:
     terms = list(dict.fromkeys(name for h in data.hypotheses for name in h.energies))
     return environment.get_template("report.html.j2").render(
         data=data,
+        pictures=[(p.caption, base64.b64encode(p.png).decode("ascii")) for p in data.pictures],
         terms=terms,
         best=min((h.energy for h in data.hypotheses if h.refined), default=math.nan),
         margin=_margin(data.margin) if data.hypotheses else "",

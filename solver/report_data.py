@@ -154,6 +154,14 @@ class Stage:
     seconds: float | None = None
 
 
+@dataclass(frozen=True)
+class Picture:
+    """A view of the session: what it shows, and the PNG file's bytes."""
+
+    caption: str
+    png: bytes
+
+
 @dataclass(frozen=True, eq=False)
 class ReportData:
     """Everything in a report; what is empty or None gets no section.
@@ -164,6 +172,7 @@ class ReportData:
     subtitle : one line on what was solved
     headlines : figures at the top
     warnings : what is ambiguous or doubtful, one sentence each
+    pictures : views of the session
     inputs : files with digests
     groups : affinity and dendrogram
     hypotheses : best first
@@ -180,6 +189,7 @@ class ReportData:
     subtitle: str = ""
     headlines: tuple[Headline, ...] = ()
     warnings: tuple[str, ...] = ()
+    pictures: tuple[Picture, ...] = ()
     inputs: tuple[InputFile, ...] = ()
     groups: Groups | None = None
     hypotheses: tuple[Hypothesis, ...] = ()

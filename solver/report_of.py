@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from solver.report_data import (
     Headline,
     Hypothesis,
     InputFile,
+    Picture,
     ReportData,
     Stage,
     marker_residuals,
@@ -40,15 +42,23 @@ _ROLES = {
 _LIBRARIES = ("numpy", "scipy", "open3d-cpu", "open3d", "ai-edge-litert", "av")
 
 
-def report_of(path: Path, session: Session, graph: GraphRun, named: Markers, about: Mapping[str, Any]) -> None:
+def report_of(
+    path: Path,
+    session: Session,
+    graph: GraphRun,
+    named: Markers,
+    about: Mapping[str, Any],
+    pictures: Sequence[Picture] = (),
+) -> None:
     """Write the report of one solve.
 
     Parameters
     ----------
     named : the labelled markers, in the order of the file's
     about : provenance: program, inputs with digests, stages with settings
+    pictures : views of the session, where somebody made them
     """
-    write_report(path, _data(session, graph, named, about))
+    write_report(path, replace(_data(session, graph, named, about), pictures=tuple(pictures)))
 
 
 def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str, Any]) -> ReportData:

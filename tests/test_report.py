@@ -21,6 +21,7 @@ from solver.report_data import (
     Headline,
     Hypothesis,
     InputFile,
+    Picture,
     ReportData,
     Stage,
     marker_residuals,
@@ -241,3 +242,11 @@ def test_ticks_are_round_and_inside(low: float, high: float) -> None:
     ticks = nice_ticks(low, high, 4)
     assert len(ticks) <= 9 and (ticks >= low - 1e-9).all() and (ticks <= high + 1e-9).all()
     assert not any(str(t) == "-0.0" for t in ticks)
+
+
+def test_pictures_are_in_the_page_itself() -> None:
+    page = render(ReportData("walk", pictures=(Picture("From the <left>", b"\x89PNG bytes"),)))
+    content = base64.b64encode(b"\x89PNG bytes").decode()
+    assert f'src="data:image/png;base64,{content}"' in page
+    assert "From the &lt;left&gt;</figcaption>" in page
+    assert "figcaption>" not in render(ReportData("walk"))

@@ -6,6 +6,7 @@ import os
 import shutil
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from app.models.keep import kept_decisions
 from app.models.signal import Signal
 from solver.errors import InputError
 from solver.io.atomic import cannot_write, make_folder
-from solver.pipeline.methods import graph_of
+from solver.pipeline.methods import graph_of, spelt_out
 from solver.pipeline.session import FILE_NAME, SUFFIX, InputFile, Session, load_session, save_session, session_folder
 
 
@@ -182,7 +183,7 @@ class Document:
             self._after_change()
 
     def save(self) -> None:
-        """Write the session file.
+        """Write the session file, with every setting and what the inputs hold.
 
         Raises
         ------
@@ -190,8 +191,10 @@ class Document:
         """
         if self.untitled:
             raise InputError("it has no place yet", "the session", "choose a folder for it")
-        save_session(self.session)
-        self._on_disk = self.session
+        session = spelt_out(self.session, digests_of(self.session))
+        save_session(session)
+        self.history.restate(session)
+        self._on_disk = session
         self._keep()
         self.home.add_recent(self.folder)
         self.saved.emit()
@@ -265,6 +268,16 @@ class Document:
 
     def _keep(self) -> None:
         self._writer.write(self.folder / JOURNAL, journal_of(self.history))
+
+
+def digests_of(session: Session) -> dict[str, str]:
+    """What each input holds (SHA-256); one that is not there is left out."""
+    cache, found = session.digests, {}
+    for name, file in session.inputs.items():
+        with suppress(InputError):
+            found[name] = cache.digest(file.path)
+    cache.save()
+    return found
 
 
 def _copy_results(old: Path, new: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from solver.pipeline.session import Session
 
@@ -68,6 +68,10 @@ class History:
         if len(self.steps) > _MOST:
             del self.steps[1 : len(self.steps) - _MOST + 1]
         self.position = len(self.steps) - 1
+
+    def restate(self, session: Session) -> None:
+        """Have the session that is there now say the same in other words."""
+        self.steps[self.position] = replace(self.steps[self.position], session=session)
 
     def go_to(self, position: int) -> bool:
         """Have the session as it was after a step; False where there is no such step or it is there already."""

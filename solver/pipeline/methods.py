@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache, reduce
 from operator import or_
@@ -49,3 +50,15 @@ def with_method(session: Session, method: Method) -> Session:
         edits={name: table for name, table in session.edits.items() if name in akin or name not in old},
         run=replace(session.run, method=method),
     )
+
+
+def spelt_out(session: Session, digests: Mapping[str, str]) -> Session:
+    """The session with every setting and what its inputs hold; edits stay apart, so that they can be taken back.
+
+    Parameters
+    ----------
+    digests : of the inputs, by name; one that is not known stays as the session has it
+    """
+    inputs = {name: replace(file, digest=digests.get(name, file.digest)) for name, file in session.inputs.items()}
+    plain = replace(session, inputs=inputs, edits={}).stage_settings(graph_of(session))
+    return replace(session, inputs=inputs).with_settings(plain)

@@ -16,7 +16,7 @@ from solver.errors import InputError
 from solver.io.camera import camera_file
 from solver.outputs import FILES, SOMETIMES, write_outputs
 from solver.pipeline.doubts import assumptions, doubts
-from solver.pipeline.methods import GRAPHS, graph_of, with_method
+from solver.pipeline.methods import GRAPHS, graph_of, spelt_out, with_method
 from solver.pipeline.output import remove_if_empty
 from solver.pipeline.request import Method, SolveOutcome, SolveRequest
 from solver.pipeline.session import InputFile, RunSettings, Session, load_session, save_session, session_folder
@@ -50,7 +50,7 @@ def solve_session(request: SolveRequest, progress: Progress = silent, on_event: 
     with _tidy(session):
         stages = graph_of(session)
         sources, settings = session.sources(SOURCES), session.stage_settings(stages)
-        session = _spelt_out(session, {name: source.digest for name, source in sources.items()})
+        session = spelt_out(session, {name: source.digest for name, source in sources.items()})
         if not session.store.has("landmarks", stage_keys(stages, sources, settings)["landmarks"]):
             _look_at_small_inputs(sources)
         graph = run_graph(
@@ -161,13 +161,6 @@ def _capped(request: SolveRequest, method: Method) -> dict[str, dict[str, Any]]:
     if not capped:
         raise InputError(f"method {method} has no such cap", "--iterations", "leave it out, or use --method paper")
     return {name: {"iterations": request.iterations} for name in capped}
-
-
-def _spelt_out(session: Session, digests: Mapping[str, str]) -> Session:
-    """The session with every setting and what its inputs hold; edits stay apart, so that they can be taken back."""
-    inputs = {name: replace(file, digest=digests[name]) for name, file in session.inputs.items()}
-    plain = replace(session, inputs=inputs, edits={}).stage_settings(graph_of(session))
-    return replace(session, inputs=inputs).with_settings(plain)
 
 
 def _save(session: Session) -> None:
