@@ -13,7 +13,18 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn, get_args
 
-from app.cli_commands import SERVICES, Services, run_bench, run_dataset, run_demo, run_evaluate, run_solve, run_synth
+from app.cli_clean import clean_options
+from app.cli_commands import (
+    SERVICES,
+    Services,
+    run_bench,
+    run_clean,
+    run_dataset,
+    run_demo,
+    run_evaluate,
+    run_solve,
+    run_synth,
+)
 from app.cli_dataset import dataset_options
 from app.cli_endings import CANCELLED, REFUSED, ended
 from app.cli_synth import synth_options
@@ -25,6 +36,7 @@ COMMANDS = {
     "demo": "solve the embedded session and say how close it came to the known truth",
     "solve": "from markers and a video to a body, named markers and joint angles",
     "evaluate": "how far a result is from another one or from a reference",
+    "clean": "cut outliers and fill gaps of a marker file, every change listed",
     "bench": "how good the methods are on synthetic sessions whose truth is known",
     "synth": "make a session whose truth is known, as files",
     "dataset": "cut your own copy of a public dataset into sessions",
@@ -84,6 +96,11 @@ def _parser() -> argparse.ArgumentParser:
     _solve_options(solve)
     _common(solve)
     solve.set_defaults(run=run_solve)
+
+    clean = commands.add_parser("clean", help=COMMANDS["clean"], description=_sentence("clean"))
+    clean_options(clean)
+    _common(clean)
+    clean.set_defaults(run=run_clean)
 
     evaluate = commands.add_parser("evaluate", help=COMMANDS["evaluate"], description=_sentence("evaluate"))
     evaluate.add_argument("result", type=Path, metavar="RESULT", help="folder that solve wrote, or its motion.npz")

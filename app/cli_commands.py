@@ -7,11 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
 
+from app.cli_clean import clean_request
 from app.cli_dataset import dataset_request
 from app.cli_output import Terminal
 from app.cli_synth import synth_settings
 from resources import resource
 from solver.bench.request import BenchRequest
+from solver.clean.request import CleanRequest
 from solver.datasets.request import DatasetRequest
 from solver.errors import InputError
 from solver.pipeline.request import EvaluateRequest, Outcome, SolveOutcome, SolveRequest, SynthRequest, check_inputs
@@ -57,6 +59,12 @@ def _dataset(request: DatasetRequest, progress: Progress) -> Outcome:
     return write_sessions(request, progress)
 
 
+def _clean(request: CleanRequest, progress: Progress) -> Outcome:
+    from solver.clean.command import clean_file
+
+    return clean_file(request, progress)
+
+
 @dataclass(frozen=True)
 class Services:
     """The solver's functions that the commands call, loaded when they are needed."""
@@ -67,6 +75,7 @@ class Services:
     bench: Callable[[BenchRequest, Progress], Outcome] = _bench
     synth: Callable[[SynthRequest, Progress], Outcome] = _synth
     dataset: Callable[[DatasetRequest, Progress], Outcome] = _dataset
+    clean: Callable[[CleanRequest, Progress], Outcome] = _clean
 
 
 SERVICES = Services()
@@ -102,6 +111,13 @@ def run_evaluate(options: argparse.Namespace, services: Services) -> int:
     with Terminal(options) as terminal:
         check_inputs(request)
         terminal.show(services.evaluate(request, terminal.progress))
+    return 0
+
+
+def run_clean(options: argparse.Namespace, services: Services) -> int:
+    """``markerscope clean``."""
+    with Terminal(options) as terminal:
+        terminal.show(services.clean(clean_request(options), terminal.progress))
     return 0
 
 

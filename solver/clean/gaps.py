@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
-Method = Literal["regression", "rigid", "edm", "pattern", "spline", "linear"]
+from solver.clean.request import Method
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-OutlierMethod = Literal["local", "prominence", "none"]
+from solver.clean.request import OutlierMethod
 
 _FLOOR_M = 0.0003
 """Below this nothing is out of the ordinary, however still the marker was."""

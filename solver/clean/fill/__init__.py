@@ -10,7 +10,8 @@ from solver.clean.fill.pattern import fill_pattern
 from solver.clean.fill.regression import fill_regression
 from solver.clean.fill.rigid import fill_rigid
 from solver.clean.fill.spline import fill_spline
-from solver.clean.gaps import Filled, FillMethod, FillSettings, Method
+from solver.clean.gaps import Filled, FillMethod, FillSettings
+from solver.clean.request import Method
 
 METHODS: dict[Method, FillMethod] = {
     "regression": fill_regression,
@@ -20,7 +21,7 @@ METHODS: dict[Method, FillMethod] = {
     "spline": fill_spline,
     "linear": fill_linear,
 }
-"""By name; a further one is added here and to ``solver.clean.gaps.Method``."""
+"""By name; a further one is added here and to ``solver.clean.request.Method``."""
 
 
 def fill(positions: np.ndarray, rate: float, settings: FillSettings) -> Filled:

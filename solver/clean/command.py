@@ -1,0 +1,125 @@
+"""What ``markerscope clean`` does: a marker file to a cleaned one, and a list of every change beside it."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from solver import __version__
+from solver.clean.changes import changes_of, lines_of
+from solver.clean.clean import Cleaned, CleanSettings, clean
+from solver.clean.request import CleanRequest
+from solver.clean.swaps import apply_proposals
+from solver.errors import InputError
+from solver.io.atomic import write_text_atomic
+from solver.markers import Markers
+from solver.pipeline.request import Outcome
+from solver.progress import Progress, part_of, silent
+
+
+def clean_file(request: CleanRequest, progress: Progress = silent) -> Outcome:
+    """Read, clean, write, and say every change.
+
+    Raises
+    ------
+    InputError : the file cannot be read or written, or an edit is to be made that was not proposed
+    """
+    from solver.io import load_markers
+    from solver.pipeline.digest import file_digest
+    from solver.pipeline.output import check_output_folder
+
+    if not request.markers.exists():
+        raise InputError("there is no such file", request.markers, "check the name and the folder")
+    if request.out.exists() and request.out.samefile(request.markers):
+        raise InputError("would be overwritten", request.out, "choose another name for the cleaned file")
+    check_output_folder(request.out.parent)
+    progress(0.0, "reading")
+    markers = load_markers(
+        request.markers,
+        up=request.up,
+        units=request.units,
+        subject=request.subject,
+        rate=request.marker_rate,
+    ).between(*(request.range or (None, None)))
+    settings = settings_of(request)
+    made: list[str] = []
+    if request.apply:
+        markers, made = _edited(markers, settings, request.apply)
+    cleaned = clean(markers, settings, part_of(progress, 0.1, 0.9))
+    progress(0.9, "writing")
+    write_markers(request.out, cleaned.markers)
+    changes = changes_of(cleaned) | {"edits_made": made}
+    about = {
+        "program": f"markerscope {__version__}",
+        "input": {"file": request.markers.name, "sha256": file_digest(request.markers)},
+        "settings": _finite(asdict(settings)),
+    }
+    listed = request.out.with_suffix(".changes.json")
+    write_text_atomic(listed, json.dumps(about | changes, indent=1, allow_nan=False) + "\n")
+    lines = (
+        *markers.notes,
+        *(f"Edit made: {sentence}" for sentence in made),
+        *lines_of(changes),
+        f"Written to {request.out}; every change is in {listed.name} beside it.",
+    )
+    return Outcome(summary={"out": str(request.out), **_totals(cleaned), **changes}, lines=lines)
+
+
+def settings_of(request: CleanRequest) -> CleanSettings:
+    """The settings that a request means."""
+    settings = CleanSettings()
+    fill, outliers = settings.fill, settings.outliers
+    if request.fill is not None and request.fill != "none":
+        fill = replace(fill, method=request.fill)
+    if request.max_gap is not None:
+        fill = replace(fill, max_gap=None if math.isinf(request.max_gap) else request.max_gap)
+    if request.min_confidence is not None:
+        fill = replace(fill, min_confidence=request.min_confidence)
+    if request.outliers is not None:
+        outliers = replace(outliers, method=request.outliers)
+    return replace(settings, fill=fill, outliers=outliers, fill_gaps=request.fill != "none")
+
+
+def write_markers(path: Path, markers: Markers) -> None:
+    """Write in the format that the name's ending says."""
+    from solver.io.export_c3d import write_c3d
+    from solver.io.export_csv import write_markers_csv
+    from solver.io.export_trc import write_trc
+
+    suffix = path.suffix.lower()
+    if suffix == ".c3d":
+        write_c3d(path, markers)
+    elif suffix == ".trc":
+        write_trc(path, markers)
+    else:
+        write_markers_csv(path, markers)
+
+
+def _edited(markers: Markers, settings: CleanSettings, numbers: tuple[int, ...]) -> tuple[Markers, list[str]]:
+    """The markers with those of the proposed edits made that were asked for."""
+    proposed = clean(markers, replace(settings, fill_gaps=False, tracks=True)).proposals
+    unknown = [number for number in numbers if number > len(proposed)]
+    if unknown:
+        what = f"there is no proposed edit {unknown[0]}, there are {len(proposed)}"
+        raise InputError(what, "--apply", "run it without, and choose from what is proposed")
+    chosen = [proposed[number - 1] for number in sorted(set(numbers))]
+    return apply_proposals(markers, chosen), [edit.sentence for edit in chosen]
+
+
+def _totals(cleaned: Cleaned) -> dict[str, object]:
+    markers = cleaned.markers
+    return {
+        "frames": len(markers.positions),
+        "markers": len(markers.labels),
+        "samples_cut": len(cleaned.outliers.frame),
+        "samples_filled": sum(fill.length for fill in cleaned.fills),
+        "samples_lost": int((~markers.present).sum()),
+    }
+
+
+def _finite(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
