@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 
 from app.views.posing import Detail, Pose, PosedPoints, fixed_points, mesh_of, pose_at, skin_points
-from app.views.seams import Seams, seams_of
 from solver.body.model import Body
 from solver.localize import R_LAB_UPRIGHT_CAMERA
 from solver.markers import Markers
@@ -49,11 +48,6 @@ class BodyTrack:
     def coarse(self) -> PosedPoints:
         """The coarse mesh, for playing and for ghosts."""
         return mesh_of(self.body, self.betas, "coarse")
-
-    @cached_property
-    def seams(self) -> Seams:
-        """The edges of the coarse mesh."""
-        return seams_of(self.coarse.faces)
 
     @cached_property
     def full(self) -> PosedPoints:

@@ -8,7 +8,6 @@ import numpy as np
 
 from app.views.bodies import BodyTrack
 from app.views.posing import BONE_EDGES
-from app.views.seams import Seams
 from app.views.tracks import MarkerTracks
 from solver.solve.results import CameraResult
 from solver.sync import Sync
@@ -64,13 +63,14 @@ class Projection:
     ----------
     markers : (M, 2) px, NaN where lost or behind the camera
     joints : (24, 2) px, and bones (23, 2), which of them a line joins
-    outline : (n, 2, 2) px, lines along which the body's near side meets its far side
+    body : (V, 2) px, the body's coarse mesh, and faces (F, 3), its triangles
     """
 
     markers: np.ndarray
     joints: np.ndarray
     bones: np.ndarray
-    outline: np.ndarray
+    body: np.ndarray
+    faces: np.ndarray
 
 
 def landmarks_at(landmarks: Landmarks, frame: int, time: float) -> SeenLandmarks:
@@ -119,21 +119,8 @@ def projection_at(
     markers = projected(camera, tracks.at(time))
     inside = tracks.markers.first_time - 1e-6 <= time <= tracks.time(len(tracks.state) - 1) + 1e-6
     if body is None or not inside:
-        return Projection(markers, np.zeros((0, 2)), np.zeros((0, 2), dtype=int), np.zeros((0, 2, 2)))
+        nothing = np.zeros((0, 2))
+        return Projection(markers, nothing, BONE_EDGES[:0], nothing, np.zeros((0, 3), dtype=np.intp))
     pose = body.pose(time)
-    px = projected(camera, body.coarse.at(pose))
-    joints = projected(camera, body.coarse.joints(pose))
-    return Projection(markers, joints, BONE_EDGES, outline(px, body.coarse.faces, body.seams))
-
-
-def outline(px: np.ndarray, faces: np.ndarray, seams: Seams) -> np.ndarray:
-    """(n, 2, 2) px, the lines of a projected mesh (V, 2) where a near triangle meets one that faces away.
-
-    A rim, where a mesh is open, is always drawn. Lines with an end behind the camera are left out.
-    """
-    a, b, c = px[faces[:, 0]], px[faces[:, 1]], px[faces[:, 2]]
-    near = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) < (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    one, other = seams.faces.T
-    drawn = (near[one] != near[other]) | (one == other)
-    lines = px[seams.vertices[drawn]]
-    return lines[np.isfinite(lines).all(axis=(1, 2))]
+    skin, joints = projected(camera, body.coarse.at(pose)), projected(camera, body.coarse.joints(pose))
+    return Projection(markers, joints, BONE_EDGES, skin, body.coarse.faces)

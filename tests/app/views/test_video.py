@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from app.views.bodies import of_motion
-from app.views.seams import seams_of
 from app.views.tracks import tracks_of
-from app.views.video import LANDMARK_EDGES, landmarks_at, outline, projected, projection_at
+from app.views.video import LANDMARK_EDGES, landmarks_at, projected, projection_at
 from solver.solve.results import CameraResult
 from solver.sync import Sync
 from solver.video.landmarks import LANDMARKS, Landmarks
@@ -53,40 +52,20 @@ def test_markers_and_body_are_taken_at_the_video_frames_own_moment(made: Made) -
     assert np.isnan(found.markers[~seen]).all()
     ends = by_opencv(made.motion.camera, made.motion.joints[20]), by_opencv(made.motion.camera, made.motion.joints[21])
     assert np.abs(found.joints - 0.5 * (ends[0] + ends[1])).max() < 1.0
-    assert len(found.bones) == 23 and len(found.outline) > 50
+    assert len(found.bones) == 23
+    skin, _ = made.body.pose(
+        made.motion.rotations[20:22], made.motion.betas, made.motion.trans[20:22], made.body.lod_index
+    )
+    assert np.abs(found.body - by_opencv(made.motion.camera, skin.mean(axis=0))).max() < 1.0
+    assert found.faces.max() == len(found.body) - 1
 
 
 def test_beyond_the_markers_nothing_is_drawn(made: Made) -> None:
     tracks, body = tracks_of(made.markers, made.motion), of_motion(made.body, made.motion)
     found = projection_at(made.motion.camera, made.sync, 30.0, tracks, body)
-    assert np.isnan(found.markers).all() and not len(found.joints) and not len(found.outline)
+    assert np.isnan(found.markers).all() and not len(found.joints) and not len(found.body)
     without = projection_at(made.motion.camera, made.sync, 0.5, tracks)
-    assert np.isfinite(without.markers).any() and not len(without.outline)
-
-
-def test_the_outline_of_a_box_is_the_edge_of_its_shadow() -> None:
-    """A cube seen at an angle shows three sides: six of its twelve edges bound the picture."""
-    corners = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    faces = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
-    seams = seams_of(faces)
-    assert len(seams.vertices) == 18  # 12 edges and the diagonals of six sides
-    assert (seams.faces[:, 0] != seams.faces[:, 1]).all()
-    turn, _ = np.linalg.qr(np.array([[1.0, 0.3, 0.2], [-0.4, 1, 0.5], [0.1, -0.6, 1]]))
-    px = (corners @ turn)[:, :2]
-    lines = outline(px, faces, seams)
-    hull = cv2.convexHull((1000 * px).astype(np.float32), returnPoints=False).ravel()
-    wanted = {frozenset((int(a), int(b))) for a, b in zip(hull, np.roll(hull, 1))}
-    found = {frozenset(int(np.abs(px - end).sum(axis=1).argmin()) for end in line) for line in lines}
-    assert found == wanted
-    px[3] = np.nan
-    assert np.isfinite(outline(px, faces, seams)).all()
-
-
-def test_the_rim_of_an_open_mesh_is_drawn() -> None:
-    faces = np.array([[0, 1, 2], [0, 2, 3]])
-    px = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
-    assert len(outline(px, faces, seams_of(faces))) == 4
+    assert np.isfinite(without.markers).any() and not len(without.body)
 
 
 @pytest.fixture
