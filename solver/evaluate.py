@@ -43,7 +43,7 @@ class Evaluation:
     mpjpe : joint position errors, m
     pa_mpjpe : the same once each frame is turned, shifted and scaled onto the reference, m
     mpjve : joint velocity errors, m/s
-    v2v : vertex errors in up to 100 frames, m; None where the two bodies have different meshes
+    v2v : vertex errors in some frames, by default up to 100, m; None where the two bodies have different meshes
     m2s, m2s_reference : m, mean distance of the measured markers to either body's surface; NaN without markers
     angles : by name, rad
     notes : what was assumed, one sentence each
@@ -120,6 +120,7 @@ def compare(
     source: str,
     notes: tuple[str, ...] = (),
     progress: Progress = silent,
+    meshes: int = _MOST_MESHES,
 ) -> Evaluation:
     """Compare a motion with a reference on the same clock.
 
@@ -128,6 +129,7 @@ def compare(
     markers : what was measured, None where it is not at hand
     source : what to call the reference in messages
     notes : what was assumed so far
+    meshes : frames, evenly spread, in which whole surfaces are compared
     """
     inside = (ours.time >= theirs.time[0] - 1e-9) & (ours.time <= theirs.time[-1] + 1e-9)
     if inside.sum() < 2:
@@ -140,7 +142,7 @@ def compare(
     ours = ours.at(ours.time[inside])
     theirs = theirs.at(ours.time)
     progress(0.1, "comparing joints and angles")
-    frames = np.unique(np.linspace(0, len(ours.time) - 1, min(_MOST_MESHES, len(ours.time))).round().astype(int))
+    frames = np.unique(np.linspace(0, len(ours.time) - 1, min(meshes, len(ours.time))).round().astype(int))
     surface = None
     if len(ours.body.template) == len(theirs.body.template):
         surface = metrics.v2v(ours.vertices(frames), theirs.vertices(frames))

@@ -26,6 +26,7 @@ from solver.pipeline.request import Outcome
 from solver.progress import Progress, part_of, silent
 
 _METHODS = ("bundle",)
+_MOTIONS = {"short": 2}
 FILES = ("bench.md", "bench.json")
 
 
@@ -42,7 +43,7 @@ def run_bench(request: BenchRequest, progress: Progress = silent) -> Outcome:
         method_named(name)
     if request.suite == "ablation":
         methods = with_ablations(methods)
-    motions = find_motions(request.motions, request.motion_count)
+    motions = find_motions(request.motions, request.motion_count or _MOTIONS.get(request.suite, 5))
     make_folder(request.out)
     runs = runs_of(request, cases, methods, motions)
     records, computed = run_all(runs, request.out, request.workers or cores(), part_of(progress, 0.0, 0.97))

@@ -53,6 +53,19 @@ class Run:
         """The method with its settings."""
         return method_named(self.method).capped(self.iterations)
 
+    @property
+    def about(self) -> dict[str, Any]:
+        """What its record begins with."""
+        return {
+            "key": self.key,
+            "case": self.case.name,
+            "method": self.method,
+            "motion": self.motion.name,
+            "seed": self.seed,
+            "iterations": self.iterations,
+            "limit": self.limit,
+        }
+
     def session(self) -> SynthSession:
         """The session, made anew."""
         return synthesise(read_source(self.motion), self.case.settings, self.seed)
@@ -64,14 +77,7 @@ class OutOfTime(Exception):
 
 def execute(run: Run) -> dict[str, Any]:
     """The record of a run, whatever happens in it."""
-    record: dict[str, Any] = {
-        "key": run.key,
-        "case": run.case.name,
-        "method": run.method,
-        "motion": run.motion.name,
-        "seed": run.seed,
-        "iterations": run.iterations,
-    }
+    record = run.about
     try:
         return record | {"status": "done"} | _measured(run)
     except OutOfTime:

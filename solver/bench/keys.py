@@ -29,7 +29,6 @@ def key_of(run: Run) -> str:
             "method": run.method,
             "settings": {name: [type(own).__name__, canonical(own)] for name, own in variant.settings.items()},
             "code": code_digest((*variant.sources, *_GENERATOR)),
-            "limit": run.limit,
         }
     )
 

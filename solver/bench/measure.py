@@ -19,6 +19,7 @@ from solver.synth.session import SynthSession
 RIGHT_SHARE = 0.8
 """Part of the markers that must sit on the right part."""
 RIGHT_HEADING_DEG = 45.0
+_MESHES = 30
 
 _REGION = np.array(
     [
@@ -59,7 +60,7 @@ def measure(session: SynthSession, solved: Solved) -> dict[str, Any]:
 def errors(session: SynthSession, motion: FittedMotion, body: Body) -> dict[str, float | None]:
     """Distances from the truth, mm and mm/s; those of the marked part beside those of the whole body."""
     found = Posed(body, motion.betas, motion.time, motion.rotations, motion.trans, motion.joints)
-    compared = compare(found, true_motion(session), real_markers(session), "the synthetic session")
+    compared = compare(found, true_motion(session), real_markers(session), "the session", meshes=_MESHES)
     part = session.settings.part
     joints = [INDEX[name] for name in PARTS[part]] if part else list(range(len(JOINTS)))
     return {**_plain(compared), "part_mpjpe_mm": float(1000 * np.nanmean(compared.mpjpe.per_point[joints]))}

@@ -18,7 +18,7 @@ class BenchRequest:
     ----------
     suite : which declared cases
     motions : folder of BVH and ASF/AMC files; None takes the program's own movements
-    motion_count : how many of the folder's at most
+    motion_count : how many of them at most; None is the suite's own
     methods : names; empty takes the suite's own
     cases : names; empty takes all of the suite
     seeds : sessions of each case and movement
@@ -32,7 +32,7 @@ class BenchRequest:
 
     suite: str
     motions: Path | None = None
-    motion_count: int = 5
+    motion_count: int | None = None
     methods: tuple[str, ...] = ()
     cases: tuple[str, ...] = ()
     seeds: int = 1

@@ -6,7 +6,7 @@ import json
 import multiprocessing
 import os
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -27,21 +27,28 @@ _THREADS = (
 _DIED = "The worker process ended without a result; the memory may have been used up."
 
 
+Work = Callable[[Run], dict[str, Any]]
+
+
 def run_all(
-    runs: Sequence[Run], folder: Path, workers: int, progress: Progress = silent
+    runs: Sequence[Run], folder: Path, workers: int, progress: Progress = silent, work: Work = execute
 ) -> tuple[list[dict[str, Any]], int]:
     """The records of all runs, in their order, and how many of them were computed now.
 
     Each is kept as ``FOLDER/runs/KEY.json``, written under a temporary name and renamed.
+
+    Parameters
+    ----------
+    work : what is called in a worker; importable by name
     """
     make_folder(folder / "runs")
-    waiting = [run for run in runs if load_record(folder, run.key) is None]
+    waiting = {run.key: run for run in runs if record_of(folder, run) is None}
     total = len(waiting)
-    for done, record in enumerate(_computed(waiting, workers), 1):
+    for done, record in enumerate(_computed(list(waiting.values()), workers, work), 1):
         write_text_atomic(record_path(folder, record["key"]), json.dumps(plain(record), indent=1) + "\n")
         what = f"{record['case']}, {record['method']}, {record['motion']}, seed {record['seed']}"
         progress(done / total, f"run {done} of {total}: {what}: {_said(record)}")
-    records = (load_record(folder, run.key) for run in runs)
+    records = (record_of(folder, run) for run in runs)
     return [record for record in records if record is not None], total
 
 
@@ -50,13 +57,17 @@ def record_path(folder: Path, key: str) -> Path:
     return folder / "runs" / f"{key}.json"
 
 
-def load_record(folder: Path, key: str) -> dict[str, Any] | None:
-    """A run's record, None where there is none that can be read."""
+def record_of(folder: Path, run: Run) -> dict[str, Any] | None:
+    """A run's record under the run's own names; None where there is none that can be read, or that had less time."""
     try:
-        record = json.loads(record_path(folder, key).read_text(encoding="utf-8"))
+        record = json.loads(record_path(folder, run.key).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return record if isinstance(record, dict) and record.get("key") == key else None
+    if not isinstance(record, dict) or record.get("key") != run.key:
+        return None
+    if record["status"] == "timed out" and (run.limit is None or run.limit > record["limit"]):
+        return None
+    return record | {"case": run.case.name, "motion": run.motion.name}
 
 
 def plain(value: Any) -> Any:
@@ -76,7 +87,7 @@ def _said(record: dict[str, Any]) -> str:
     return f"{record['mpjpe_mm']:.1f} mm" if record["status"] == "done" else str(record["status"])
 
 
-def _computed(runs: Sequence[Run], workers: int) -> Iterator[dict[str, Any]]:
+def _computed(runs: Sequence[Run], workers: int, work: Work) -> Iterator[dict[str, Any]]:
     """Records as they come. Runs that were in flight when a worker died are tried once more, each by itself."""
     suspects: list[Run] = []
     queue = list(reversed(runs))
@@ -87,7 +98,7 @@ def _computed(runs: Sequence[Run], workers: int) -> Iterator[dict[str, Any]]:
                 while queue or flying:
                     while queue and len(flying) < workers:
                         run = queue.pop()
-                        flying[pool.submit(execute, run)] = run
+                        flying[pool.submit(work, run)] = run
                     for future in wait(flying, return_when=FIRST_COMPLETED).done:
                         yield future.result()
                         del flying[future]
@@ -96,10 +107,9 @@ def _computed(runs: Sequence[Run], workers: int) -> Iterator[dict[str, Any]]:
     for run in suspects:
         with _pool(1) as pool:
             try:
-                yield pool.submit(execute, run).result()
+                yield pool.submit(work, run).result()
             except BrokenProcessPool:
-                about = {"key": run.key, "case": run.case.name, "method": run.method, "motion": run.motion.name}
-                yield about | {"seed": run.seed, "iterations": run.iterations, "status": "failed", "sentence": _DIED}
+                yield run.about | {"status": "failed", "sentence": _DIED}
 
 
 @contextmanager

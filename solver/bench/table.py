@@ -174,7 +174,7 @@ def markdown_of(rows: Sequence[Row], bins: Sequence[Bin]) -> str:
 
 def _runs(row: Row) -> str:
     notes = [f"{count} {what}" for count, what in ((row.failed, "failed"), (row.timed_out, "timed out")) if count]
-    return f"{row.runs}{f' ({chr(44).join(notes)})' if notes else ''}"
+    return f"{row.runs} ({', '.join(notes)})" if notes else str(row.runs)
 
 
 def _share(part: int, whole: int) -> str:
