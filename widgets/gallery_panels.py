@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QWidget
 
+from widgets import palette
+from widgets.panels.hypotheses import HypothesesView, Hypothesis, Term
 from widgets.panels.stage_data import EarlierResult, FieldSpec, StageData, StageProgress
 from widgets.panels.stage_panel import StagePanel
+from widgets.panels.transport import Readout, Transport
 
 SEGMENT = (
     FieldSpec(
@@ -48,4 +53,47 @@ def stages() -> QWidget:
     return made
 
 
-EXAMPLES = {"stages": stages}
+TERMS = (
+    ("markers", "markers to skin"),
+    ("video", "video landmarks"),
+    ("prior", "likely poses"),
+    ("time", "smoothness"),
+)
+
+
+def hypotheses() -> QWidget:
+    """Four yaws; the second is the runner-up."""
+    rng = np.random.default_rng(6)
+    cards: list[Hypothesis] = []
+    inks = palette.categorical(4)
+    for k in range(4):
+        values = rng.uniform(0.005, 0.03, 4) * (1 + 0.35 * k)
+        terms = tuple(
+            Term(*name, "How much it adds.", float(v), tuple(ink.tolist())) for name, v, ink in zip(TERMS, values, inks)
+        )
+        energy = float(values.sum())
+        first = cards[0].energy if cards else energy
+        cards.append(
+            Hypothesis(k, "pelvis and both legs", 90.0 * k - 134, energy, terms, energy / first, k == 3, k == 1, k == 0)
+        )
+    made = HypothesesView()
+    picture = QImage(320, 240, QImage.Format.Format_RGB32)
+    picture.fill(0x8899AA)
+    made.set_cards(
+        cards, [picture, picture, None, picture], "The first is ahead of the best other answer by 1.4 times."
+    )
+    made.set_selected(1)
+    made.resize(900, made.sizeHint().height())
+    return made
+
+
+def transport() -> QWidget:
+    """Playing at half speed."""
+    made = Transport()
+    made.set_readouts(Readout(1234, 6000, 12.34), Readout(370, 1800, 12.345))
+    made.set_state(True, 0.5, True)
+    made.resize(max(760, made.sizeHint().width()), made.sizeHint().height())
+    return made
+
+
+EXAMPLES = {"stages": stages, "hypotheses": hypotheses, "transport": transport}

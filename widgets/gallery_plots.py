@@ -7,6 +7,9 @@ from PySide6.QtWidgets import QWidget
 
 from widgets import palette
 from widgets.plots.affinity import AffinityView
+from widgets.plots.angle_data import AngleCurve, AnglePlot
+from widgets.plots.convergence import ConvergenceView, EnergyCurve
+from widgets.plots.curves import CurvesView
 from widgets.plots.pair import PairPlot
 from widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
 from widgets.plots.timelines import Timelines
@@ -124,4 +127,53 @@ def pair_plot() -> QWidget:
     return made
 
 
-EXAMPLES = {"timelines": timelines, "affinity": affinity_view, "pair": pair_plot}
+def curves() -> QWidget:
+    """Legs over 12 s, with another result dashed."""
+    time = np.arange(360) / 30
+    rng = np.random.default_rng(8)
+    plots = []
+    for joint, names in {
+        "pelvis": ("tilt", "obliquity", "rotation"), "hip": ("flexion", "adduction", "rotation"), "knee": ("flexion",),
+        "ankle": ("dorsiflexion", "inversion"), "shoulder": ("flexion", "abduction"), "elbow": ("flexion",),
+    }.items():  # fmt: skip
+        for name in names:
+            made = []
+            for side, ink in (
+                (("", palette.LEFT),) if joint == "pelvis" else (("left", palette.LEFT), ("right", palette.RIGHT))
+            ):
+                size, lag = rng.uniform(8, 45), rng.uniform(0, 1)
+                degrees = size * (1 - np.cos(1.6 * time + lag)) + rng.normal(0, 0.4, 360)
+                degrees[100:130] = np.nan if side == "right" else degrees[100:130]
+                made.append(AngleCurve(f"{joint}_{name}_{side[:1]}", side, degrees, degrees * 0.93 + 3, name, "", ink))
+            plots.append(AnglePlot(joint, f"{joint.capitalize()} {name}", tuple(made)))
+    view = CurvesView()
+    view.set_curves(time, plots, "OpenSim gait model", "the T pose")
+    view.set_time(5.3)
+    view.resize(980, 430)
+    return view
+
+
+def convergence() -> QWidget:
+    """Five candidates, of which the lowest is scrubbed."""
+    iteration = np.unique(np.geomspace(1, 400, 90).astype(int)) - 1
+    made = ConvergenceView()
+    found = [
+        EnergyCurve(
+            "refine", f"candidate {k + 1}, heading {60 * k}°",
+            iteration, 0.09 + 0.03 * k + 2.5 * np.exp(-iteration / (8 + 6 * k)), tuple(ink.tolist()), "converged",
+        )
+        for k, ink in enumerate(palette.categorical(5))
+    ]  # fmt: skip
+    made.set_curves(found)
+    made.set_iteration(1, 37)
+    made.resize(520, 420)
+    return made
+
+
+EXAMPLES = {
+    "curves": curves,
+    "convergence": convergence,
+    "timelines": timelines,
+    "affinity": affinity_view,
+    "pair": pair_plot,
+}

@@ -10,7 +10,7 @@ from PySide6.QtGui import QFontMetricsF, QImage, QPainter, QPolygonF
 
 from widgets import palette
 from widgets.plots.dendrogram import Dendrogram, blocks
-from widgets.plots.ink import colour, elided, image_of, pen, y_axis
+from widgets.plots.ink import colour, elided, image_of, legible, pen, y_axis
 from widgets.plots.scales import Scale, number
 from widgets.theme import colours
 
@@ -96,7 +96,7 @@ def paint_tree(
     within = (changes[spans[:, 0]] == changes[spans[:, 1] - 1]) & (clusters[spans[:, 0]] >= 0)
     plain, width = pen(look.faint, 1.2), 1.8 if unit > 6 else 1.2
     for k in range(len(found)):
-        painter.setPen(pen(inks[spans[k, 0]], width) if within[k] else plain)
+        painter.setPen(pen(legible(inks[spans[k, 0]]), width) if within[k] else plain)
         (x0, x1), (y0, y1, top) = x[k], y[k]
         painter.drawPolyline(QPolygonF([QPointF(x0, y0), QPointF(x0, top), QPointF(x1, top), QPointF(x1, y1)]))
     painter.setClipping(False)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import shiboken6
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
+from widgets import palette
 from widgets.plots.scales import Scale, number
 from widgets.theme import colours, qcolour
 
+_CONTRAST = 3.0
+"""What WCAG asks of lines and signs."""
 _NO_AA = 1500
 """Points beyond which a line is drawn without smoothing: it is an envelope then, and has no slopes to smooth."""
 
@@ -18,6 +23,21 @@ _NO_AA = 1500
 def colour(rgb: np.ndarray | tuple[int, ...], alpha: int = 255) -> QColor:
     """Qt's colour for a triple of numbers."""
     return qcolour(tuple(int(c) for c in rgb), alpha)
+
+
+@cache
+def _legible(rgb: tuple[int, ...], ground: tuple[int, int, int]) -> tuple[int, ...]:
+    mixed, towards = np.array(rgb, np.float64), np.array(palette.text_on(ground), np.float64)
+    for _ in range(12):
+        if palette.contrast(mixed, ground) >= _CONTRAST:
+            break
+        mixed += 0.12 * (towards - mixed)
+    return tuple(np.rint(mixed).astype(int).tolist())
+
+
+def legible(rgb: np.ndarray | tuple[int, ...]) -> tuple[int, ...]:
+    """The colour, or one of its hue that is told from the ground of a plot as a thin line, too."""
+    return _legible(tuple(int(part) for part in rgb), colours().base)
 
 
 def em(widget: QWidget) -> float:
@@ -83,7 +103,7 @@ def y_axis(painter: QPainter, area: QRectF, scale: Scale, unit: str, apart: floa
             painter.setPen(colour(look.faint))
             text = number(value, step)
             if value == values[-1] and unit:
-                text = f"{text} {unit}"
+                text = f"{text}{unit}" if unit == "°" else f"{text} {unit}"
             top = min(
                 max(y - metrics.height() / 2, area.top() - metrics.height() * 0.4), area.bottom() - metrics.height()
             )

@@ -10,7 +10,7 @@ from PySide6.QtGui import QFontMetricsF, QPainter
 
 from widgets import palette
 from widgets.plots.decimate import Counts, envelope, presence_picture, shown_frames, strength
-from widgets.plots.ink import colour, elided, image_of, pen, polyline, runs, y_axis
+from widgets.plots.ink import colour, elided, image_of, legible, pen, polyline, runs, y_axis
 from widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, Row, StateRow
 from widgets.plots.scales import Scale, clock, limits, number
 from widgets.theme import colours
@@ -306,7 +306,7 @@ def draw_curve(
     """One line, decimated to the pixels of the area."""
     clock_of = own if own is not None else (time if curve.time is None else curve.time)
     at, values = envelope(clock_of, curve.values, x.low, x.high, max(1, round(area.width())))
-    painter.setPen(pen(curve.colour, 1.6, curve.dashed))
+    painter.setPen(pen(legible(curve.colour), 1.6, curve.dashed))
     polyline(painter, x.pixel(at), y.pixel(values))
 
 
@@ -320,7 +320,7 @@ def legend(painter: QPainter, area: QRectF, curves: tuple[Curve, ...]) -> None:
             break
         box = QRectF(right - width, area.top() + 2, width, metrics.height() + 2)
         painter.fillRect(box, colour(look.base, 215))
-        painter.setPen(pen(curve.colour, 2.0, curve.dashed))
+        painter.setPen(pen(legible(curve.colour), 2.0, curve.dashed))
         middle = box.center().y()
         painter.drawLine(QPointF(box.left() + 4, middle), QPointF(box.left() + 18, middle))
         painter.setPen(colour(look.text))

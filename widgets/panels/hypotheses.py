@@ -1,0 +1,314 @@
+"""The answers beside each other: a picture, what their energies are made of, and how far they are apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QFont, QHelpEvent, QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPixmap
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QScrollArea,
+    QSizePolicy,
+    QToolTip,
+    QVBoxLayout,
+    QWidget,
+)
+
+from widgets.icons import icon
+from widgets.plots.ink import colour, em, pen
+from widgets.plots.scales import number
+from widgets.theme import colours
+
+
+@dataclass(frozen=True)
+class Term:
+    """One part of an energy; any object with these attributes will do."""
+
+    name: str
+    title: str
+    help: str
+    value: float
+    colour: tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One answer; any object with these attributes will do.
+
+    Attributes
+    ----------
+    candidate : its number, given back by the signals
+    title : the part of the body, in words
+    heading_deg : degrees, which way it faces about the vertical
+    energy : what the answers are ranked by
+    terms : that it is made of, all answers in the same order
+    margin : energy over that of the first
+    same_as_first, runner_up, in_use : what it is beside the others
+    """
+
+    candidate: int
+    title: str
+    heading_deg: float
+    energy: float
+    terms: tuple[Term, ...]
+    margin: float
+    same_as_first: bool = False
+    runner_up: bool = False
+    in_use: bool = False
+
+
+class EnergyBar(QWidget):
+    """Terms stacked along a line, to a scale that all answers share."""
+
+    def __init__(self, terms: Sequence[Any], highest: float, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._terms, self._highest = tuple(terms), highest
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName("Energy by term")
+        self.setAccessibleDescription(", ".join(f"{term.title} {number(term.value)}" for term in terms))
+
+    def sizeHint(self) -> QSize:
+        """A line of text high."""
+        return QSize(120, round(em(self)))
+
+    def parts(self) -> list[tuple[Any, QRectF]]:
+        """Each term and where it is drawn."""
+        left, found, wide = 0.0, [], (self.width() - 1) / (self._highest or 1.0)
+        for term in self._terms:
+            found.append((term, QRectF(left, 0, term.value * wide, self.height() - 1)))
+            left += term.value * wide
+        return found
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the terms, each apart from the next."""
+        painter, look = QPainter(self), colours()
+        painter.fillRect(self.rect(), colour(look.base))
+        for term, rect in self.parts():
+            painter.fillRect(rect, colour(term.colour))
+            painter.fillRect(QRectF(rect.right() - 1, 0, 1, rect.height()), colour(look.base))
+        painter.setPen(pen(look.border))
+        painter.drawRect(QRectF(0, 0, self.width() - 1, self.height() - 1))
+
+    def event(self, event: QEvent) -> bool:
+        """Say what each term is."""
+        if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
+            found = next((term for term, rect in self.parts() if rect.contains(event.pos().toPointF())), None)
+            text = "" if found is None else f"{found.title}: {number(found.value)}. {found.help}"
+            QToolTip.showText(event.globalPos(), text, self)
+            return True
+        return super().event(event)
+
+
+class HypothesisCard(QFrame):
+    """One answer to click on."""
+
+    clicked = Signal(int)
+    pin_requested = Signal(int)
+
+    def __init__(self, card: Any, picture: QImage | None, highest: float, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.card = card
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setFrameShape(QFrame.Shape.StyledPanel)
+        line = self.fontMetrics().height()
+        self.setFixedWidth(round(15 * line))
+        self._chosen = False
+        image = QLabel()
+        image.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        image.setFixedHeight(round(10 * line))
+        if picture is None:
+            image.setText("no picture yet")
+            image.setEnabled(False)
+        else:
+            ratio = self.devicePixelRatioF()
+            size = QSize(round(14 * line * ratio), round(10 * line * ratio))
+            shown = picture.scaled(size, Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation)
+            shown.setDevicePixelRatio(ratio)
+            image.setPixmap(QPixmap.fromImage(shown))
+        title = QLabel(card.title)
+        title.setWordWrap(True)
+        bold = QFont(title.font())
+        bold.setBold(True)
+        title.setFont(bold)
+        figures = QLabel(
+            f"Heading {number(card.heading_deg, 1)}°\nEnergy {number(card.energy)}, {card.margin:.2f} × best"
+        )
+        figures.setToolTip(
+            "Heading: which way it faces about the vertical axis of the lab. Energy: the less, the better"
+        )
+        badges = [
+            text
+            for text, on in (
+                ("in use", card.in_use),
+                ("runner-up", card.runner_up),
+                ("same as the first", card.same_as_first),
+            )
+            if on
+        ]
+        badge = QLabel(", ".join(badges))
+        badge.setStyleSheet(f"color: rgb{colours().accent}")
+        self.pin = QPushButton(icon("pin"), "In use" if card.in_use else "Pin")
+        self.pin.setToolTip("Hold this answer, and go on from it; can be undone")
+        self.pin.setEnabled(not card.in_use)
+        self.pin.clicked.connect(lambda: self.pin_requested.emit(card.candidate))
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(6, 6, 6, 6)
+        for part in (image, title, EnergyBar(card.terms, highest), figures, badge):
+            layout.addWidget(part)
+        layout.addStretch(1)
+        layout.addWidget(self.pin)
+        said = ", ".join(
+            [card.title, f"heading {card.heading_deg:.0f} degrees", f"{card.margin:.2f} times best", *badges]
+        )
+        self.setAccessibleName(said)
+
+    def set_chosen(self, on: bool) -> None:
+        """Frame the card."""
+        if on != self._chosen:
+            self._chosen = on
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the ground, and a frame where it is chosen or has the focus."""
+        painter, look = QPainter(self), colours()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        strong = self._chosen or self.hasFocus()
+        painter.setPen(pen(look.accent if strong else look.border, 2.5 if self._chosen else 1))
+        painter.setBrush(colour(look.raised))
+        painter.drawRoundedRect(QRectF(self.rect()).adjusted(1.5, 1.5, -1.5, -1.5), 4, 4)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Choose it."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.clicked.emit(self.card.candidate)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Choose it by Enter, pin it by P."""
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.clicked.emit(self.card.candidate)
+        elif event.key() == Qt.Key.Key_P and self.pin.isEnabled():
+            self.pin_requested.emit(self.card.candidate)
+        else:
+            super().keyPressEvent(event)
+
+
+class TermKey(QWidget):
+    """What the colours of the bars mean, on as many lines as are needed."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._terms: tuple[Any, ...] = ()
+        policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
+        policy.setHeightForWidth(True)
+        self.setSizePolicy(policy)
+
+    def set_terms(self, terms: Sequence[Any]) -> None:
+        """Show these."""
+        self._terms = tuple(terms)
+        self.updateGeometry()
+        self.update()
+
+    def hasHeightForWidth(self) -> bool:
+        """It has."""
+        return True
+
+    def heightForWidth(self, width: int) -> int:
+        """Lines that are needed."""
+        places = self._places(width)
+        return round(places[-1].bottom() + 2) if places else 0
+
+    def sizeHint(self) -> QSize:
+        """One line."""
+        return QSize(300, self.heightForWidth(max(self.width(), 300)))
+
+    def _places(self, width: float) -> list[QRectF]:
+        x, y, line, found = 0.0, 0.0, em(self), []
+        for term in self._terms:
+            wide = self.fontMetrics().horizontalAdvance(term.title) + 1.6 * line
+            if x and x + wide > width:
+                x, y = 0.0, y + 1.25 * line
+            found.append(QRectF(x, y, wide, 1.2 * line))
+            x += wide + 6
+        return found
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw swatches and names."""
+        painter, line = QPainter(self), em(self)
+        for term, box in zip(self._terms, self._places(self.width())):
+            painter.fillRect(QRectF(box.left(), box.top() + 0.25 * line, 0.7 * line, 0.7 * line), colour(term.colour))
+            painter.setPen(colour(colours().text))
+            painter.drawText(box.adjusted(line, 0, 0, 0), int(Qt.AlignmentFlag.AlignVCenter), term.title)
+
+
+class HypothesesView(QWidget):
+    """Cards in a row.
+
+    Signals
+    -------
+    hypothesis_selected(candidate), pin_requested(candidate)
+    """
+
+    hypothesis_selected = Signal(int)
+    pin_requested = Signal(int)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Hypotheses")
+        self._sentence, self._key = QLabel(), TermKey()
+        self._sentence.setWordWrap(True)
+        self._row = QHBoxLayout()
+        self._row.setContentsMargins(0, 0, 0, 0)
+        inner = QWidget()
+        inner.setLayout(self._row)
+        self._scroll = QScrollArea()
+        self._scroll.setWidgetResizable(True)
+        self._scroll.setFrameShape(QFrame.Shape.NoFrame)
+        self._scroll.setWidget(inner)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(4, 4, 4, 4)
+        layout.addWidget(self._sentence)
+        layout.addWidget(self._key)
+        layout.addWidget(self._scroll, 1)
+        self._cards: list[HypothesisCard] = []
+        self.set_cards([])
+
+    def set_cards(self, cards: Sequence[Any], pictures: Sequence[QImage | None] = (), sentence: str = "") -> None:
+        """Show answers, the best first, each with a picture or None; ``sentence`` says how sure the first is."""
+        while (item := self._row.takeAt(0)) is not None:
+            if (old := item.widget()) is not None:
+                old.deleteLater()
+        self._sentence.setText(sentence if cards else "There are no hypotheses yet: run the stage Orientation.")
+        self._key.set_terms(cards[0].terms if cards else ())
+        highest = max((sum(term.value for term in card.terms) for card in cards), default=1.0)
+        shown = [*pictures, *[None] * (len(cards) - len(pictures))]
+        self._cards = [HypothesisCard(card, picture, highest) for card, picture in zip(cards, shown)]
+        for made in self._cards:
+            made.clicked.connect(self._choose)
+            made.pin_requested.connect(self.pin_requested)
+            self._row.addWidget(made)
+        self._row.addStretch(1)
+
+    def cards(self) -> list[HypothesisCard]:
+        """The cards, left to right."""
+        return list(self._cards)
+
+    def set_selected(self, candidate: int) -> None:
+        """Frame the card of a candidate; nothing is emitted."""
+        for made in self._cards:
+            made.set_chosen(made.card.candidate == candidate)
+            if made.card.candidate == candidate:
+                self._scroll.ensureWidgetVisible(made)
+
+    def sizeHint(self) -> QSize:
+        """Three cards."""
+        return QSize(round(47 * em(self)), round(26 * em(self)))
+
+    def _choose(self, candidate: int) -> None:
+        self.set_selected(candidate)
+        self.hypothesis_selected.emit(candidate)

@@ -1,0 +1,42 @@
+"""What the view of joint angles shows, as plain arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+Rgb = tuple[int, int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class AngleCurve:
+    """One angle of one side; any object with these attributes will do.
+
+    Attributes
+    ----------
+    name : its column in the files
+    side : "left", "right", or "" for pelvis and trunk
+    degrees : (T,) NaN where it means nothing
+    reference : (T,) the same of another result, None where there is none
+    positive : what a positive value means
+    rests_on : what it was found from, such as "video only"; "" if unknown
+    colour : of its side
+    """
+
+    name: str
+    side: str
+    degrees: np.ndarray
+    reference: np.ndarray | None = None
+    positive: str = ""
+    rests_on: str = ""
+    colour: Rgb = (0, 114, 178)
+
+
+@dataclass(frozen=True, eq=False)
+class AnglePlot:
+    """One angle, of both sides where there are two: its joint, its title, and its curves."""
+
+    joint: str
+    title: str
+    curves: tuple[AngleCurve, ...]
