@@ -11,6 +11,9 @@ import pytest
 
 from app import cli_synth
 from app.cli import main
+from app.cli_commands import Services
+from solver.pipeline.request import Outcome, SynthRequest
+from solver.progress import Progress
 from solver.synth.acts import ACTS
 from solver.synth.session import SynthSettings
 
@@ -64,3 +67,37 @@ def test_the_manual_names_every_motion() -> None:
     for name in ACTS:
         assert f"| `{name}` |" in (docs / "synthetic.md").read_text(encoding="utf-8")
         assert f"`{name}`" in (docs / "command-line.md").read_text(encoding="utf-8")
+
+
+def test_every_option_reaches_the_generator(tmp_path: Path) -> None:
+    asked = []
+
+    def note(request: SynthRequest, progress: Progress) -> Outcome:
+        asked.append(request)
+        return Outcome(summary={})
+
+    given = {name: (kind, "0.25") for group in cli_synth._GROUPS.values() for name, kind, *_ in group}
+    values = {name: kind("2" if kind is int else text) for name, (kind, text) in given.items()}
+    values |= {"part": "left_leg", "layout": "full_body", "shape": "inside", "desync_frames": -2, "longest_gap": -1.5}
+    words = [word for name, value in values.items() for word in (f"--{name.replace('_', '-')}", str(value))]
+    more = [
+        "--seed",
+        "7",
+        "--skeleton",
+        "a.asf",
+        "--motion-rate",
+        "60",
+        "--no-nested",
+        "--video-wrong-shape",
+        "--quiet",
+    ]
+    assert main(["synth", "a.amc", "--out", str(tmp_path), *words, *more], Services(synth=note)) == 0
+    settings = {**values, "nested": False, "video_wrong_shape": True}
+    assert asked == [SynthRequest("a.amc", tmp_path, 7, Path("a.asf"), 60.0, settings)]
+
+
+def test_what_is_not_given_has_its_default(tmp_path: Path) -> None:
+    asked = []
+    services = Services(synth=lambda request, progress: asked.append(request) or Outcome(summary={}))
+    assert main(["synth", "walk", "--out", str(tmp_path), "--quiet"], services) == 0
+    assert asked == [SynthRequest("walk", tmp_path)]
