@@ -8,7 +8,10 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-from PySide6.QtGui import QImage
+from PySide6.QtCore import QRect
+from PySide6.QtGui import QImage, QPainter
+
+from widgets import theme
 
 
 def of_rgba(picture: np.ndarray) -> QImage:
@@ -28,6 +31,16 @@ def to_rgb(picture: QImage) -> np.ndarray:
     """(H, W, 3) uint8 of Qt's picture, in its own pixels."""
     plain = picture.convertToFormat(QImage.Format.Format_RGBX8888)
     return np.frombuffer(plain.constBits(), np.uint8).reshape(plain.height(), plain.width(), 4)[..., :3].copy()
+
+
+def draw_focus(painter: QPainter, area: QRect) -> None:
+    """A line about a picture that has the keyboard."""
+    colour = theme.qcolour(theme.colours().accent, 160)
+    for side in (
+        QRect(0, 0, area.width(), 1), QRect(0, area.height() - 1, area.width(), 1),
+        QRect(0, 1, 1, area.height() - 2), QRect(area.width() - 1, 1, 1, area.height() - 2),
+    ):  # fmt: skip
+        painter.fillRect(side, colour)
 
 
 def save(picture: QImage, path: str | Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,14 @@ _TURNS = {  # azimuth from where the person faces, elevation; degrees
     "isometric": (40.0, 22.0),
 }  # fmt: skip
 NEAREST, FARTHEST = 0.02, 500.0  # m
+
+
+@lru_cache(maxsize=64)
+def _basis(azimuth: float, elevation: float) -> np.ndarray:
+    ca, sa, ce, se = np.cos(azimuth), np.sin(azimuth), np.cos(elevation), np.sin(elevation)
+    basis = np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
+    basis.flags.writeable = False  # shared by all who ask for it
+    return basis
 
 
 @dataclass(frozen=True)
@@ -40,9 +49,7 @@ class Camera:
 
     def basis(self) -> np.ndarray:
         """(3, 3) rows: right, up and backwards (from the target to the camera) in the lab."""
-        ca, sa, ce, se = np.cos(self.azimuth), np.sin(self.azimuth), np.cos(self.elevation), np.sin(self.elevation)
-        right, back = np.array([-sa, ca, 0.0]), np.array([ce * ca, ce * sa, se])
-        return np.stack([right, np.cross(back, right), back])
+        return _basis(self.azimuth, self.elevation)
 
     def position(self) -> np.ndarray:
         """(3) m."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QFont, QFontMetricsF, QImage, QPainter, QPen
+from PySide6.QtGui import QFont, QFontMetricsF, QImage, QPainter, QPen, QPixmap
 
 from widgets import palette
 from widgets.scene.legend import ColourBar, Legend, Rgb
@@ -13,8 +13,35 @@ _PAD, _GAP, _MARGIN = 8.0, 6.0, 10.0
 _BAR = (150.0, 12.0)
 
 
-def draw_legend(painter: QPainter, legend: Legend, width: float, height: float, look: Colours) -> QRectF:
-    """Paint it in the upper right corner of a picture of this size; returns what it covers."""
+class LegendPainter:
+    """Keeps the last legend it painted, so that an unchanged one costs next to nothing."""
+
+    def __init__(self) -> None:
+        self._key: tuple[object, ...] = ()
+        self._kept, self._box = QPixmap(), QRectF()
+
+    def paint(self, painter: QPainter, legend: Legend, size: tuple[int, int], look: Colours) -> QRectF:
+        """Paint it in the upper right corner of a picture of this size; returns what it covers."""
+        ratio = painter.device().devicePixelRatioF()
+        key = (legend, size, look, painter.font().key(), ratio)
+        if key != self._key:
+            whole = QPixmap(round(size[0] * ratio), round(size[1] * ratio))
+            whole.setDevicePixelRatio(ratio)
+            whole.fill(Qt.GlobalColor.transparent)
+            own = QPainter(whole)
+            own.setRenderHints(painter.renderHints())
+            own.setFont(painter.font())
+            self._box = _draw(own, legend, *size, look)
+            own.end()
+            # Of the whole picture keep the corner alone, cut at full pixels of the screen.
+            left, bottom = int((self._box.left() - 2) * ratio), int((self._box.bottom() + 2) * ratio)
+            self._kept = whole.copy(max(0, left), 0, whole.width(), min(bottom, whole.height()))
+            self._left, self._key = max(0, left) / ratio, key
+        painter.drawPixmap(QPointF(self._left, 0), self._kept)
+        return self._box
+
+
+def _draw(painter: QPainter, legend: Legend, width: float, height: float, look: Colours) -> QRectF:
     bold = QFont(painter.font())
     bold.setBold(True)
     panel = _Panel(painter, bold, look, width, height)

@@ -20,11 +20,17 @@ class Words:
 
     def __init__(self) -> None:
         self._kept: dict[tuple[object, ...], QPixmap] = {}
+        self._sizes: dict[tuple[str, str], tuple[float, float]] = {}
 
     def size(self, text: str, font: QFont) -> tuple[float, float]:
         """Width and height of a text with its outline."""
-        metrics = QFontMetricsF(font)
-        return metrics.horizontalAdvance(text) + 4.0, metrics.height() + 2.0
+        key = (text, font.key())
+        if key not in self._sizes:
+            if len(self._sizes) >= _KEPT_WORDS:
+                self._sizes.clear()
+            metrics = QFontMetricsF(font)
+            self._sizes[key] = metrics.horizontalAdvance(text) + 4.0, metrics.height() + 2.0
+        return self._sizes[key]
 
     def draw(self, painter: QPainter, at: QPointF, text: str, ink: QColor, outline: QColor) -> None:
         """Paint a text with its upper left corner at ``at``, in the painter's font."""
@@ -59,21 +65,27 @@ class Words:
 class Places:
     """Which parts of the picture are taken by words already."""
 
-    def __init__(self, taken: Sequence[QRectF] = ()) -> None:
-        self._boxes = np.array([(r.left(), r.top(), r.right(), r.bottom()) for r in taken], dtype=float).reshape(-1, 4)
+    def __init__(self) -> None:
+        self._boxes = np.zeros((64, 4))  # left, top, right, bottom
+        self._count = 0
 
-    def hold(self, left: float, top: float, width: float, height: float) -> None:
-        """Take a box whether or not a part of it is taken."""
-        self._boxes = np.concatenate([self._boxes, [[left, top, left + width, top + height]]])
+    def hold(self, boxes: np.ndarray) -> None:
+        """Take boxes (N, 4), left, top, right and bottom, whether or not parts of them are taken."""
+        while self._count + len(boxes) > len(self._boxes):
+            self._boxes = np.concatenate([self._boxes, np.zeros_like(self._boxes)])
+        self._boxes[self._count : self._count + len(boxes)] = boxes
+        self._count += len(boxes)
 
-    def take(self, left: float, top: float, width: float, height: float) -> bool:
-        """Take a box unless a part of it is taken."""
-        box = np.array([left, top, left + width, top + height])
-        held = self._boxes
-        if ((box[0] < held[:, 2]) & (box[2] > held[:, 0]) & (box[1] < held[:, 3]) & (box[3] > held[:, 1])).any():
-            return False
-        self._boxes = np.concatenate([held, box[None]])
-        return True
+    def take(self, boxes: np.ndarray) -> int:
+        """Take the first of boxes (N, 4) of which no part is taken, and return which; -1 where there is none."""
+        held = self._boxes[: self._count]
+        low, high = boxes[:, None, :2] < held[None, :, 2:], boxes[:, None, 2:] > held[None, :, :2]
+        free = ~(low & high).all(axis=2).any(axis=1)
+        first = int(free.argmax())
+        if not free[first]:
+            return -1
+        self.hold(boxes[first : first + 1])
+        return first
 
 
 def draw_labels(
@@ -87,31 +99,36 @@ def draw_labels(
     reach: float,
 ) -> None:
     """Write each text beside its point of pixels (N, 2), NaN left out; one that finds no free place is not written."""
-    for (x, y), text in zip(pixels, texts):
-        if np.isnan(x) or not text:
+    font = painter.font()
+    for (x, y), text in zip(pixels.tolist(), texts):
+        if x != x or not text:
             continue
-        width, height = words.size(text, painter.font())
-        for left, top in (
-            (x + reach, y - 0.5 * height), (x - reach - width, y - 0.5 * height),
-            (x - 0.5 * width, y - reach - height), (x - 0.5 * width, y + reach),
-            (x + 0.7 * reach, y - reach - 0.7 * height), (x + 0.7 * reach, y + 0.4 * reach),
-            (x - 0.7 * reach - width, y - reach - 0.7 * height), (x - 0.7 * reach - width, y + 0.4 * reach),
-        ):  # fmt: skip
-            if places.take(left + 2, top + 2, width - 4, height - 4):
-                words.draw(painter, QPointF(left, top), text, ink, outline)
-                break
+        width, height = words.size(text, font)
+        near, far = 0.7 * reach, 0.4 * reach
+        left, right, above, below = x - reach - width, x + reach, y - reach - height, y + reach
+        corners = np.array(
+            [
+                (right, y - 0.5 * height), (left, y - 0.5 * height), (x - 0.5 * width, above), (x - 0.5 * width, below),
+                (x + near, above + 0.3 * height), (x + near, y + far),
+                (x - near - width, above + 0.3 * height), (x - near - width, y + far),
+            ]
+        )  # fmt: skip
+        found = places.take(np.concatenate([corners + 2, corners + np.array([width - 2, height - 2])], axis=1))
+        if found >= 0:
+            words.draw(painter, QPointF(*corners[found].tolist()), text, ink, outline)
 
 
 def draw_ticks(
     painter: QPainter, words: Words, places: Places, pixels: np.ndarray, texts: Sequence[str], look: Colours
 ) -> None:
     """Write the floor's numbers centred on pixels (N, 2), leaving out those without room."""
-    for (x, y), text in zip(pixels, texts):
-        if np.isnan(x):
+    font = painter.font()
+    for (x, y), text in zip(pixels.tolist(), texts):
+        if x != x:
             continue
-        width, height = words.size(text, painter.font())
+        width, height = words.size(text, font)
         left, top = x - 0.5 * width, y - 0.5 * height
-        if places.take(left, top, width, height):
+        if places.take(np.array([[left, top, left + width, top + height]])) >= 0:
             words.draw(painter, QPointF(left, top), text, qcolour(look.faint), qcolour(look.outline, 140))
 
 

@@ -10,7 +10,7 @@ from widgets import palette, theme
 from widgets.scene.camera import Camera
 from widgets.scene.layers import LEAST_RADIUS_PX, MARKER_RADIUS
 from widgets.scene.legend import Legend
-from widgets.scene.legend_paint import draw_legend
+from widgets.scene.legend_paint import LegendPainter
 from widgets.scene.overlay import Places, Words, draw_axes, draw_band, draw_labels, draw_rings, draw_ticks
 from widgets.scene.stage import Stage
 from widgets.theme import qcolour
@@ -34,6 +34,7 @@ class Sheet:
         self.hovered = -1
         self.legend: Legend | None = None
         self._words = Words()
+        self._panel = LegendPainter()
 
     def paint(
         self,
@@ -51,10 +52,12 @@ class Sheet:
             box = QRectF(0, 0, width, height).adjusted(20, 20, -20, -20)
             painter.drawText(box, int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap), stage.problem)
             return
-        taken = [QRectF(0, height - 84, 88, 84)] if stage.shows("axes") else []
+        places = Places()
+        if stage.shows("axes"):
+            places.hold(np.array([[0, height - 84, 88, height]]))
         if self.legend is not None and stage.shows("legend"):
-            taken.append(draw_legend(painter, self.legend, width, height, look))
-        places = Places(taken)
+            panel = self._panel.paint(painter, self.legend, size, look)
+            places.hold(np.array([[panel.left(), panel.top(), panel.right(), panel.bottom()]]))
         if stage.shows("markers"):
             self._markers(painter, stage, camera, size, places)
         if stage.floor is not None and stage.shows("floor"):
@@ -79,8 +82,8 @@ class Sheet:
         draw_rings(painter, pixels[hovered], radius + 3.5, look.text, look)
         if not self.labels:
             return
-        for x, y in pixels[np.isfinite(pixels[:, 0])]:
-            places.hold(x - 0.8 * radius, y - 0.8 * radius, 1.6 * radius, 1.6 * radius)
+        dots = pixels[np.isfinite(pixels[:, 0])]
+        places.hold(np.concatenate([dots - 0.8 * radius, dots + 0.8 * radius], axis=1))
         first = hovered + [i for i in chosen if i not in hovered]
         rest = [i for i in range(len(pixels)) if i not in set(first)] if stage.shows("labels") else []
         plain, bold = QFont(painter.font()), QFont(painter.font())

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QEvent, QRectF, Qt, QTimer, Signal
-from PySide6.QtGui import QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QResizeEvent, QWheelEvent
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, QTimer, Signal
+from PySide6.QtGui import QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from widgets import theme
-from widgets.images import of_rgba, save, to_rgb
+from widgets.images import draw_focus, of_rgba, save, to_rgb
 from widgets.scene.camera import Camera
 from widgets.scene.legend import ColourBar, Legend, Rgb
 from widgets.scene.navigate import HELP, Navigator
@@ -318,13 +318,15 @@ class Scene3D(QWidget):
                 self._quick()
             assert self._picture is not None
             painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-            painter.drawImage(QRectF(self.rect()), self._picture)
+            if self._picture.size() == self.size() * self.devicePixelRatioF():
+                painter.drawImage(QPointF(0, 0), self._picture)
+            else:
+                painter.drawImage(QRectF(self.rect()), self._picture)
         else:
             painter.fillRect(self.rect(), theme.qcolour(theme.colours().scene_bottom))
         self._sheet.paint(painter, self._stage, self._camera, (self.width(), self.height()), self._navigator.band)
         if self.hasFocus():
-            painter.setPen(QPen(theme.qcolour(theme.colours().accent, 160), 1.0))
-            painter.drawRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5))
+            draw_focus(painter, self.rect())
         painter.end()
 
     def resizeEvent(self, event: QResizeEvent) -> None:

@@ -23,7 +23,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from widgets import palette, theme
-from widgets.images import of_rgb, save
+from widgets.images import draw_focus, of_rgb, save
 from widgets.video.outline import Outline
 from widgets.video.zoom import Zoom
 
@@ -184,9 +184,7 @@ class VideoView(QWidget):
         painter = QPainter(self)
         self._paint(painter)
         if self.hasFocus():
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.setPen(QPen(theme.qcolour(theme.colours().accent, 160), 1.0))
-            painter.drawRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5))
+            draw_focus(painter, self.rect())
         painter.end()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
