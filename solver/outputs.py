@@ -24,6 +24,7 @@ from solver.io.camera import FILE_NAME as CAMERA
 from solver.io.camera import write_camera
 from solver.io.export_smpl import write_smpl_npz
 from solver.markers import Markers
+from solver.pipeline.cleaning import measured
 from solver.pipeline.digest import canonical, file_digest
 from solver.pipeline.methods import graph_of
 from solver.pipeline.session import Session
@@ -174,7 +175,7 @@ def _write(
     from solver.io.export_trc import write_trc
     from solver.report_of import report_of
 
-    markers, motion, angles = graph["markers"], graph["fit"], graph["angles"]
+    markers, motion, angles = measured(graph["clean"]), graph["fit"], graph["angles"]
     body_file = session.inputs.get("body_file")
     body = with_bone_lengths(Body.load(body_file.path if body_file else None))
     named = labelled(markers, motion)

@@ -13,6 +13,7 @@ import numpy as np
 from solver.angles import JointAngles
 from solver.body.skeleton import BONES, JOINTS
 from solver.markers import Markers
+from solver.pipeline.cleaning import measured
 from solver.pipeline.doubts import doubts
 from solver.pipeline.session import Session
 from solver.pipeline.stage import GraphRun
@@ -62,7 +63,7 @@ def report_of(
 
 
 def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str, Any]) -> ReportData:
-    markers, motion, ranked = graph["markers"], graph["fit"], graph["orient"]
+    markers, motion, ranked = measured(graph["clean"]), graph["fit"], graph["orient"]
     notes = {"marker_file": markers.notes, "prior_file": graph["prior"].notes}
     inputs = tuple(
         InputFile(_ROLES.get(name, name), row["file"], row["sha256"], tuple(notes.get(name, ())))

@@ -24,12 +24,14 @@ class CleanSettings:
     fill_gaps : fill gaps, those of the cut samples among them
     fill : how
     tracks : look for tracks that exchanged or broke
+    keep : (marker, first frame, last frame), samples that are not cut whatever they look like
     """
 
     outliers: OutlierSettings = field(default_factory=OutlierSettings)
     fill_gaps: bool = True
     fill: FillSettings = field(default_factory=FillSettings)
     tracks: bool = True
+    keep: tuple[tuple[int, int, int], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +95,8 @@ def clean(markers: Markers, settings: CleanSettings | None = None, progress: Pro
         )
     progress(0.0, "looking for outliers")
     out = find_outliers(markers.positions, markers.rate, settings.outliers)
+    for kept, first, last in settings.keep:
+        out[first : last + 1, kept] = False
     frame, marker = np.nonzero(out)
     already = np.zeros(out.shape, bool) if markers.filled is None else markers.filled
     cut = Cut(frame, marker, markers.positions[frame, marker].copy(), already[frame, marker].copy())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from solver.pipeline.cleaning import notes_of
 from solver.pipeline.stage import GraphRun
 
 _BAD_FIT_M = 0.03
@@ -12,7 +13,7 @@ _BAD_FIT_M = 0.03
 
 def assumptions(graph: GraphRun) -> tuple[str, ...]:
     """What was assumed while the files were read."""
-    return (*graph["markers"].notes, *graph["prior"].notes)
+    return (*graph["markers"].notes, *notes_of(graph["clean"]), *graph["prior"].notes)
 
 
 def doubts(graph: GraphRun) -> tuple[str, ...]:

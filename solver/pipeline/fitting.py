@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from solver.angles import AngleSettings, JointAngles
+from solver.pipeline.cleaning import measured
 from solver.pipeline.stage import NoSettings
 from solver.progress import Progress
 from solver.segment import Segmentation, SegmentSettings
@@ -24,15 +25,15 @@ def group_markers(given: Mapping[str, Any], settings: SegmentSettings, progress:
     """Markers that move together."""
     from solver.segment import segment
 
-    return segment(given["markers"], settings, progress)
+    return segment(given["clean"].markers, settings, progress)
 
 
 def scene(given: Mapping[str, Any]) -> tuple[Body, Observations, Points]:
     """The body with free bone lengths, what was observed on the markers' clock, and the landmarks' body points."""
     from solver.solve.observe import observe
 
-    body, sync = _body(given), given["sync"]
-    seen, points = observe(given["markers"], given["prior"], given["landmarks"], body, sync.offset, sync.rate_ratio)
+    body, sync, markers = _body(given), given["sync"], measured(given["clean"])
+    seen, points = observe(markers, given["prior"], given["landmarks"], body, sync.offset, sync.rate_ratio)
     return body, seen, points
 
 
@@ -66,7 +67,7 @@ def fit_every_frame(given: Mapping[str, Any], settings: FitSettings, progress: P
     from solver.solve.method import fit
 
     body, seen, points = scene(given)
-    time = given["markers"].time
+    time = given["clean"].markers.time
     return fit(body, seen, points, given["localize"], given["orient"], time, settings, progress)
 
 
@@ -92,4 +93,4 @@ def measure_surface(given: Mapping[str, Any], settings: NoSettings, progress: Pr
     """How far the markers are from the fitted skin."""
     from solver.surface import surface_distance
 
-    return surface_distance(_body(given), given["fit"], given["markers"].positions, progress)
+    return surface_distance(_body(given), given["fit"], measured(given["clean"]).positions, progress)

@@ -10,6 +10,7 @@ import numpy as np
 
 from solver.errors import InputError
 from solver.markers import Markers
+from solver.pipeline.cleaning import measured
 from solver.prior import PosePrior
 from solver.progress import Progress
 from solver.sync import Sync
@@ -164,7 +165,7 @@ def _video_rate(landmarks: Landmarks) -> float | None:
 
 def synchronise(given: Mapping[str, Any], settings: SyncSettings, progress: Progress) -> Sync:
     """The clock of the video on the clock of the markers: as given, else found from the motion."""
-    markers: Markers = given["markers"]
+    markers: Markers = given["clean"].markers
     prior: PosePrior = given["prior"]
     found = _given_offset(settings) or _found_offset(given, settings)
     in_sight = _in_sight(prior, found, markers)
@@ -203,9 +204,9 @@ def _found_offset(given: Mapping[str, Any], settings: SyncSettings) -> Sync:
         watched = landmarks_of_prior(given["prior"], Body.load())
     window = None if settings.search_s is None else (-settings.search_s, settings.search_s)
     if settings.rate_ratio is None:
-        return find_offset(watched, given["markers"], search=window)
+        return find_offset(watched, measured(given["clean"]), search=window)
     watched = replace(watched, time=watched.time * settings.rate_ratio)
-    found = find_offset(watched, given["markers"], search=window)
+    found = find_offset(watched, measured(given["clean"]), search=window)
     # A ratio that was given stays: where another fits better, the two agree in the middle of the video.
     middle = 0.5 * (watched.time[0] + watched.time[-1])
     return replace(found, rate_ratio=settings.rate_ratio, offset=found.offset + (found.rate_ratio - 1) * middle)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from solver.angles import AngleSettings, JointAngles
+from solver.clean.clean import Cleaned
 from solver.markers import Markers
-from solver.pipeline import fitting, inputs
+from solver.pipeline import cleaning, fitting, inputs
+from solver.pipeline.cleaning import CleaningSettings
 from solver.pipeline.inputs import LandmarkSettings, MarkerSettings, PriorSettings, SyncSettings
 from solver.pipeline.stage import NoSettings, Stage
 from solver.prior import PosePrior
@@ -70,11 +72,14 @@ def _said_angles(angles: JointAngles) -> str:
     return f"{len(angles.names)} angles ({angles.title})"
 
 
-FITTED_TO = ("markers", "prior", "landmarks", "sync", "body_file")
+FITTED_TO = ("clean", "prior", "landmarks", "sync", "body_file")
 """What every stage of the fit looks at."""
 
 GRAPH = (
     Stage("markers", 1, MarkerSettings, ("marker_file",), inputs.read_markers, Markers, _said_markers, cost=0.5),
+    Stage(
+        "clean", 1, CleaningSettings, ("markers",), cleaning.clean_markers, Cleaned, cleaning.said_cleaning, cost=0.5
+    ),
     Stage(
         "landmarks",
         1,
@@ -86,10 +91,8 @@ GRAPH = (
         cost=16,
     ),
     Stage("prior", 1, PriorSettings, ("prior_file", "landmarks"), inputs.pose_prior, PosePrior, cost=2),
-    Stage("sync", 1, SyncSettings, ("markers", "landmarks", "prior"), inputs.synchronise, Sync, _said_sync, cost=1),
-    Stage(
-        "segment", 1, SegmentSettings, ("markers",), fitting.group_markers, Segmentation, said_segmentation, cost=0.3
-    ),
+    Stage("sync", 1, SyncSettings, ("clean", "landmarks", "prior"), inputs.synchronise, Sync, _said_sync, cost=1),
+    Stage("segment", 1, SegmentSettings, ("clean",), fitting.group_markers, Segmentation, said_segmentation, cost=0.3),
     Stage(
         "localize",
         1,
@@ -102,7 +105,7 @@ GRAPH = (
     ),
     Stage(
         "orient",
-        1,
+        2,
         OrientSettings,
         (*FITTED_TO, "localize", "camera_file"),
         fitting.rank_placements,
@@ -125,7 +128,7 @@ GRAPH = (
         "surface",
         1,
         NoSettings,
-        ("fit", "markers", "body_file"),
+        ("fit", "clean", "body_file"),
         fitting.measure_surface,
         SurfaceDistance,
         _said_surface,

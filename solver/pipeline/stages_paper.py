@@ -31,7 +31,7 @@ def find_part(given: Mapping[str, Any], settings: PaperLocalizeSettings, progres
 
     body, seen, _ = scene_of(given)
     return localize_paper(
-        body, seen, given["markers"].time, given["segment"].clusters, settings, given["prior"].betas, progress
+        body, seen, given["clean"].markers.time, given["segment"].clusters, settings, given["prior"].betas, progress
     )
 
 
@@ -57,7 +57,7 @@ def every_frame(given: Mapping[str, Any], settings: PaperFitSettings, progress: 
 
     body, seen, _ = scene_of(given)
     found, solved, ranked = given["localize"], given["solve"], given["orient"]
-    return motion_of(body, seen, given["markers"].time, found, solved, ranked, settings, progress)
+    return motion_of(body, seen, given["clean"].markers.time, found, solved, ranked, settings, progress)
 
 
 def _said_part(found: PaperLocalization) -> str:
@@ -78,7 +78,7 @@ _OWN = (
         "segment",
         1,
         PaperSegmentSettings,
-        ("markers",),
+        ("clean",),
         group_markers,
         Segmentation,
         said_segmentation,

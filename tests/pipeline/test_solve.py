@@ -74,7 +74,8 @@ def edited(folder: Path, edits: Mapping[str, Mapping[str, Any]]) -> SolveRequest
 @pytest.mark.parametrize(
     ("stage", "name", "value", "changed"),
     [
-        ("markers", "start", 0.5, {"markers", "segment", "sync"} | FITTED),
+        ("markers", "start", 0.5, {"markers", "clean", "segment", "sync"} | FITTED),
+        ("clean", "ratio", 9.0, {"clean", "segment", "sync"} | FITTED),
         ("landmarks", "rate", 15.0, {"landmarks", "prior", "sync"} | FITTED),
         ("prior", "rate", 25.0, {"prior", "sync"} | FITTED),
         ("sync", "offset", 0.2, {"sync"} | FITTED),
@@ -96,7 +97,7 @@ def test_a_setting_changes_what_depends_on_it(stage: str, name: str, value: Any,
 @pytest.mark.parametrize(
     ("source", "changed"),
     [
-        ("marker_file", {"markers", "segment", "sync"} | FITTED),
+        ("marker_file", {"markers", "clean", "segment", "sync"} | FITTED),
         ("video_file", {"landmarks", "prior", "sync"} | FITTED),
         ("prior_file", {"prior", "sync"} | FITTED),
         ("camera_file", FITTED),

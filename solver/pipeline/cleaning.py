@@ -1,0 +1,96 @@
+"""The stage that cleans the markers, and what of it the later stages may look at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from solver.clean.clean import Cleaned, CleanSettings, clean, put_back
+from solver.clean.gaps import FillSettings
+from solver.clean.outliers import OutlierSettings
+from solver.clean.request import Filling, OutlierMethod
+from solver.clean.swaps import Proposal, apply_proposals
+from solver.errors import InputError
+from solver.markers import Markers
+from solver.progress import Progress
+
+
+@dataclass(frozen=True)
+class CleaningSettings:
+    """How the markers are cleaned before anything is made of them.
+
+    Attributes
+    ----------
+    outliers : how they are found; ``none`` cuts nothing
+    ratio : times the usual acceleration that is too much
+    least : m, samples nearer to their track than this are never outliers
+    fill : how gaps are filled for the grouping; filled samples count as measured nowhere
+    max_gap : s, longer gaps stay
+    min_confidence : 0..1, gaps whose filling would be less sure stay
+    keep : (marker, first frame, last frame), samples that are not cut
+    swaps : (marker, marker, frame), tracks to be exchanged from that frame on
+    joins : (marker, other, first frame, last frame), samples of the other to be given to the marker
+    """
+
+    outliers: OutlierMethod = "local"
+    ratio: float = OutlierSettings.ratio
+    least: float = OutlierSettings.least
+    fill: Filling = "none"
+    max_gap: float | None = FillSettings.max_gap
+    min_confidence: float = FillSettings.min_confidence
+    keep: tuple[tuple[int, int, int], ...] = ()
+    swaps: tuple[tuple[int, int, int], ...] = ()
+    joins: tuple[tuple[int, int, int, int], ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot work."""
+        self.plain()
+
+    def plain(self) -> CleanSettings:
+        """The same for ``clean``."""
+        return CleanSettings(
+            OutlierSettings(method=self.outliers, ratio=self.ratio, least=self.least),
+            fill_gaps=self.fill != "none",
+            fill=FillSettings(
+                method="regression" if self.fill == "none" else self.fill,
+                max_gap=self.max_gap,
+                min_confidence=self.min_confidence,
+            ),
+            keep=self.keep,
+        )
+
+
+def clean_markers(given: Mapping[str, Any], settings: CleaningSettings, progress: Progress) -> Cleaned:
+    """The edits made that the user chose, outliers cut, gaps filled if asked for."""
+    markers: Markers = given["markers"]
+    count, frames = len(markers.labels), len(markers.positions)
+    edits = [
+        *(Proposal("swap", frame, frames - 1, (a, b), 0.0, "") for a, b, frame in settings.swaps),
+        *(Proposal("join", first, last, (a, b), 0.0, "") for a, b, first, last in settings.joins),
+    ]
+    named = [m for edit in edits for m in edit.markers] + [m for m, _, _ in settings.keep]
+    for marker in named:
+        if not 0 <= marker < count:
+            raise InputError(
+                f"there is no marker {marker}; they are numbered 0 to {count - 1}", "clean", "correct the edit"
+            )
+    return clean(apply_proposals(markers, edits), settings.plain(), progress)
+
+
+def measured(cleaned: Cleaned) -> Markers:
+    """What was measured and not cut: the markers that a body is fitted to, and that it is judged by."""
+    return put_back(cleaned, outliers=False)
+
+
+def notes_of(cleaned: Cleaned) -> tuple[str, ...]:
+    """What a user should know of the cleaning: what was cut, and each edit that is proposed."""
+    cut = cleaned.outliers
+    said = f"{len(cut.frame)} samples of {len(set(cut.marker.tolist()))} markers were cut as outliers."
+    return (*((said,) if len(cut.frame) else ()), *(edit.sentence for edit in cleaned.proposals))
+
+
+def said_cleaning(cleaned: Cleaned) -> str:
+    """What was cut, filled and proposed."""
+    cut, filled = len(cleaned.outliers.frame), sum(fill.length for fill in cleaned.fills)
+    return f"{cut} samples cut, {filled} filled, {len(cleaned.proposals)} edits of tracks proposed"
