@@ -27,9 +27,9 @@ from solver.solve.results import FittedMotion, Orientation
 
 _UNSURE = 0.5
 """Below this confidence in the offset a solve asks its user for it."""
-SHARED_CODE = ("body", "markers.py", "prior.py", "prior_fill.py", "rotations.py", "sync.py", "video/shadow.py",
+SHARED_CODE = ("body", "clean", "markers.py", "prior.py", "prior_fill.py", "rotations.py", "sync.py", "video/shadow.py",
            "video/lift.py", "segment.py", "affinity.py", "localize.py", "solve/*.py", "pipeline/fitting.py",
-           "pipeline/stages.py", "pipeline/inputs.py")  # fmt: skip
+           "pipeline/stages.py", "pipeline/inputs.py", "pipeline/cleaning.py")  # fmt: skip
 PAPER_CODE = (*SHARED_CODE, "solve/paper", "pipeline/stages_paper.py")
 
 
