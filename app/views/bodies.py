@@ -173,7 +173,12 @@ def of_chain(
 
 
 def of_iteration(
-    body: Body, trace: Trace, step: int, found: PaperLocalization, markers: Markers, vertex: np.ndarray
+    body: Body,
+    trace: Trace,
+    step: int,
+    found: Localization | PaperLocalization,
+    markers: Markers,
+    vertex: np.ndarray,
 ) -> BodyTrack:
     """The body as one of the iterations that a trace kept had it.
 
@@ -183,10 +188,11 @@ def of_iteration(
     vertex : (U,) of each marker, as the stage has it; none where it has none yet
     """
     used = found.markers if len(vertex) else np.zeros(0, dtype=np.intp)
+    frames = found.frames if isinstance(found, PaperLocalization) else found.few
     return BodyTrack(
         body,
         trace.betas[step],
-        markers.time[found.frames[trace.frames]],
+        markers.time[frames[trace.frames]],
         exp_so3(trace.rotation_vectors[step].astype(float)),
         trace.trans[step].astype(float),
         used,

@@ -25,7 +25,7 @@ FATES: dict[Fate, str] = {
     "kept": "not yet laid over the markers",
     "left behind": "relaxed on a few keyframes, then others were better",
     "merged": "ran into a better one while it was refined",
-    "scored": "laid over the markers, then others were better",
+    "scored": "laid over the markers and compared",
     "refined": "refined to the end",
 }
 
@@ -153,7 +153,8 @@ def bone_names(bones: Sequence[int] | np.ndarray) -> tuple[str, ...]:
     return tuple(bone_name(int(j)) for j in np.unique(bones) if j >= 0)
 
 
-def _part_name(bones: np.ndarray) -> str:
+def part_of_bones(bones: np.ndarray) -> str:
+    """The part of the body that they make up, in words."""
     from solver.solve.method import part_name  # brings the solver and half of scipy with it
 
     return part_name(bones)
@@ -170,7 +171,7 @@ def _of_hypotheses(
             pool=h,
             candidate=place.get(h, -1),
             fate="found" if ranked is None else "merged",
-            part=_part_name(found.bone[h]),
+            part=part_of_bones(found.bone[h]),
             bones=bone_names(found.bone[h]),
             yaw_deg=float(found.yaw_deg[h]),
             heading_deg=float(np.degrees(np.arctan2(view[1], view[0]))),
@@ -259,7 +260,7 @@ def _chains(found: PaperLocalization, ranked: Orientation | None) -> tuple[Candi
                 pool=int(row),
                 candidate=place.get(int(row), -1),
                 fate="scored",
-                part=_part_name(fit.bones),
+                part=part_of_bones(fit.bones),
                 bones=bone_names(fit.bones),
                 yaw_deg=fit.yaw_deg,
                 distance=1000 * fit.one_way**0.5,
@@ -268,14 +269,14 @@ def _chains(found: PaperLocalization, ranked: Orientation | None) -> tuple[Candi
             )
         )
     for i in range(len(found.candidates), len(found.pruned)):
-        rows.append(CandidateRow(i, -1, "kept", _part_name(found.pruned[i]), bone_names(found.pruned[i])))
+        rows.append(CandidateRow(i, -1, "kept", part_of_bones(found.pruned[i]), bone_names(found.pruned[i])))
     kept = {frozenset(int(j) for j in chain) for chain in found.pruned}
     size = found.pruned.shape[1] if found.pruned.ndim == 2 else 0
     if size:
         for chain in subtrees(size):
             if chain not in kept:
                 bones = np.array(sorted(chain))
-                rows.append(CandidateRow(-1, -1, "too alike", _part_name(bones), bone_names(bones)))
+                rows.append(CandidateRow(-1, -1, "too alike", part_of_bones(bones), bone_names(bones)))
     return tuple(rows)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.views.colours import RGB, rgb
 from solver.solve.paper.results import Descent, PaperLocalization, PaperSolve, Trace
-from solver.solve.results import Orientation
+from solver.solve.results import Candidate, Orientation
 from widgets import palette
 
 _CHAINS_SHOWN = 5
@@ -46,10 +46,7 @@ class EnergyCurve:
 
 
 def of_orientation(ranked: Orientation) -> tuple[EnergyCurve, ...]:
-    """The default method's descents, one a candidate; between its phases the terms are weighed anew, so curves jump.
-
-    It keeps no poses on the way.
-    """
+    """The default method's descents, one a candidate; between its phases the terms are weighed anew, so curves jump."""
     colours = palette.categorical(len(ranked.candidates))
     return tuple(
         EnergyCurve(
@@ -59,8 +56,25 @@ def of_orientation(ranked: Orientation) -> tuple[EnergyCurve, ...]:
             iteration=1 + np.arange(len(own.trace)),
             energy=np.array(own.trace, dtype=float),
             colour=rgb(colours[i]),
+            trace=_trace(own),
+            vertex=np.zeros(0, dtype=np.intp),
         )
         for i, own in enumerate(ranked.candidates)
+    )
+
+
+def _trace(own: Candidate) -> Trace | None:
+    """The steps that a candidate kept."""
+    if own.steps is None:
+        return None
+    count, frames = own.steps.trans.shape[:2]
+    return Trace(
+        iteration=1 + np.arange(count),
+        energy=np.array(own.trace, dtype=float),
+        frames=np.arange(frames),
+        rotation_vectors=own.steps.rotation_vectors,
+        trans=own.steps.trans,
+        betas=own.steps.betas,
     )
 
 

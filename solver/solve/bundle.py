@@ -7,6 +7,7 @@ different answer is the confidence.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -15,7 +16,7 @@ import numpy as np
 from solver.body.model import Body
 from solver.localize import Hypothesis
 from solver.parallel import spread
-from solver.progress import Progress, silent
+from solver.progress import Found, Progress, silent, tell
 from solver.rotations import log_so3
 from solver.solve.kinematics import Points, Pose, blended_turn, forward, place_points
 from solver.solve.placement import Skin
@@ -69,6 +70,7 @@ class Fit:
     surface : the skin below each marker
     energies : its cost by kind of evidence, per frame
     trace : total energy after every step
+    poses : after every step, of the keyframes that it was solved on then
     refined : True once it was solved on all keyframes
     """
 
@@ -77,6 +79,7 @@ class Fit:
     surface: Surface
     energies: Energies
     trace: tuple[float, ...]
+    poses: tuple[Pose, ...] = ()
     refined: bool = False
 
 
@@ -115,9 +118,19 @@ def locate_camera(problem: Problem, pose: Pose, turn: np.ndarray, weights: Weigh
 
 
 def descend(
-    problem: Problem, state: State, surface: Surface, phases: tuple[Phase, ...], base: Weights
+    problem: Problem,
+    state: State,
+    surface: Surface,
+    phases: tuple[Phase, ...],
+    base: Weights,
+    watch: Callable[[Pose], None] = lambda pose: None,
 ) -> tuple[State, Surface, tuple[float, ...]]:
-    """Damped Gauss-Newton through the given phases; each step is kept only if it costs less."""
+    """Damped Gauss-Newton through the given phases; each step is kept only if it costs less.
+
+    Parameters
+    ----------
+    watch : told the pose after every step
+    """
     trace: list[float] = []
     for phase in phases:
         weights = phase_weights(base, phase)
@@ -139,6 +152,7 @@ def descend(
                 state, surface = reattach(problem.body, state)
                 cost = problem.energies(state, weights, surface).total
             trace.append(cost)
+            watch(state.pose)
             if gain < _ENOUGH:
                 break
     return state, surface, tuple(trace)
@@ -233,12 +247,15 @@ def relax(
 
     progress(0.0, f"relaxing {len(guesses)} hypotheses")
     pool = spread(first_look, guesses)
+    say = partial(_tell, progress, guesses)
+    say(pool)
     # Poor starts are dropped early: each phase costs as much as all before it.
     for i, phase in enumerate(COARSE[1:]):
         pool.sort(key=lambda fit: fit.energies.total)
         count = max(keep * 2, len(guesses) // 2 ** (i + 1))
         progress(0.3 + 0.15 * i, f"relaxing {count} hypotheses")
         pool = spread(partial(_advance, problem, phases=(phase,), base=base, judge=judge), pool[:count]) + pool[count:]
+        say(pool[:count])
     pool.sort(key=lambda fit: fit.energies.total)
     chosen = _varied(pool, keep)
     whole = Problem(body, seen.at(many), landmarks)
@@ -256,9 +273,19 @@ def relax(
         )
 
     fine = _basins(spread(closer_look, chosen))
+    say(fine)
     fine = spread(partial(_advance, whole, phases=FINE[1:], base=base, judge=judge), fine)
     fine.sort(key=lambda fit: fit.energies.total)
+    say(fine)
     return tuple(fine) + tuple(fit for fit in pool if not any(fit is one for one in chosen))
+
+
+def _tell(progress: Progress, guesses: Sequence[Hypothesis], fits: Sequence[Fit]) -> None:
+    """Report how the hypotheses stand to whoever watches."""
+    row = {id(guess): i for i, guess in enumerate(guesses)}
+    for fit in fits:
+        values = {"energy": fit.energies.total, "refined": fit.refined}
+        tell(progress, Found("candidate", row[id(fit.start)], values))
 
 
 def _judging(weights: Weights, problem: Problem) -> Weights:
@@ -275,9 +302,12 @@ def _judging(weights: Weights, problem: Problem) -> Weights:
 
 def _advance(problem: Problem, fit: Fit, *, phases: tuple[Phase, ...], base: Weights, judge: Weights) -> Fit:
     """The same fit after some more phases of descent."""
-    state, surface, trace = descend(problem, fit.state, fit.surface, phases, base)
+    poses: list[Pose] = []
+    state, surface, trace = descend(problem, fit.state, fit.surface, phases, base, poses.append)
     energies = problem.energies(state, judge, surface)
-    return replace(fit, state=state, surface=surface, energies=energies, trace=fit.trace + trace)
+    return replace(
+        fit, state=state, surface=surface, energies=energies, trace=fit.trace + trace, poses=fit.poses + tuple(poses)
+    )
 
 
 def _basins(fits: list[Fit]) -> list[Fit]:

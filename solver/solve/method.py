@@ -11,12 +11,13 @@ from solver.body.skeleton import JOINTS, PARTS
 from solver.errors import InputError
 from solver.localize import Hypothesis, Search, hypotheses
 from solver.progress import Progress, silent
+from solver.rotations import log_so3
 from solver.solve.bundle import Fit, relax
 from solver.solve.kinematics import Points, Pose, forward, place_points
 from solver.solve.placement import Skin
 from solver.solve.problem import Problem
 from solver.solve.refine import every_frame
-from solver.solve.results import CameraResult, Candidate, FittedMotion, Localization, Orientation
+from solver.solve.results import CameraResult, Candidate, FittedMotion, Localization, Orientation, Steps
 from solver.solve.state import Camera, Observations, State, Surface, Weights
 
 _REACH_M = 2.0
@@ -226,7 +227,9 @@ def orient(
     )
     index = {id(guess): i for i, guess in enumerate(guesses)}
     whole = Problem(body, used.at(found.many), landmarks)
-    candidates = tuple(_candidate(body, fit, index[id(fit.start)], whole) for fit in fits)
+    candidates = tuple(
+        _candidate(body, fit, index[id(fit.start)], whole, _steps(fit.poses, found.few, found.many)) for fit in fits
+    )
     return judge(candidates, used)
 
 
@@ -284,7 +287,18 @@ def _camera_of(camera: CameraResult, centre: np.ndarray) -> Camera:
     return Camera(camera.R_lab_cam, (centre - camera.position) @ camera.R_lab_cam, centre, camera.focal)
 
 
-def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem) -> Candidate:
+def _steps(poses: tuple[Pose, ...], few: np.ndarray, many: np.ndarray) -> Steps | None:
+    """Poses after each step, solved on the few or on the many keyframes, in the few that they have in common."""
+    if not poses:
+        return None
+    common = np.searchsorted(many, few)
+    shown = [pose if len(pose.trans) == len(few) else pose.at(common) for pose in poses]
+    vectors = log_so3(np.stack([pose.rotations for pose in shown])).astype(np.float32)
+    trans = np.stack([pose.trans for pose in shown]).astype(np.float32)
+    return Steps(vectors, trans, np.stack([pose.betas for pose in shown]))
+
+
+def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem, steps: Steps | None) -> Candidate:
     state, camera = fitted.state, fitted.state.camera
     bone = state.placement.weights.argmax(axis=1)
     view = camera.R_lab_cam[:, 2]
@@ -313,6 +327,7 @@ def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem) -> Cand
         rotations=state.pose.rotations,
         trans=state.pose.trans,
         trace=fitted.trace,
+        steps=steps,
     )
 
 

@@ -56,6 +56,22 @@ class Localization:
     yaw_deg: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """The body after each step of a descent, in the few keyframes.
+
+    Attributes
+    ----------
+    rotation_vectors : (n, N, 24, 3) rad, float32; root in the lab, others relative to the parent
+    trans : (n, N, 3) m, float32
+    betas : (n, S)
+    """
+
+    rotation_vectors: np.ndarray
+    trans: np.ndarray
+    betas: np.ndarray
+
+
 @dataclass(frozen=True)
 class Candidate:
     """A hypothesis after bundle adjustment.
@@ -76,6 +92,7 @@ class Candidate:
     betas : (S,) shape, bone lengths last
     rotations, trans : pose of the keyframes, lab frame
     trace : total energy after each step
+    steps : the body after each of these, where it was kept
     """
 
     hypothesis: int
@@ -96,6 +113,7 @@ class Candidate:
     rotations: np.ndarray
     trans: np.ndarray
     trace: tuple[float, ...]
+    steps: Steps | None = None
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.progress import Progress
+from solver.progress import Found, Progress, tell
 from solver.rotations import log_so3
 from solver.solve.paper.results import BodyState, Descent, Trace
 
@@ -83,6 +83,7 @@ def minimise(
         energies = _values(terms)
         if taken:
             trace.add(done, energies, body())
+            tell(progress, Found("iteration", done, {"text": text, "energy": sum(energies.values())}))
     progress(1.0, text)
     return Descent(energies, done, evaluations, converged, trace.finished())
 

@@ -10,7 +10,7 @@ import numpy as np
 from solver.body.model import Body
 from solver.body.skeleton import JOINTS
 from solver.errors import InputError
-from solver.progress import Progress, part_of, silent
+from solver.progress import Found, Progress, part_of, silent, tell
 from solver.solve.paper.chains import candidate_chains
 from solver.solve.paper.descent import minimise
 from solver.solve.paper.energies import shape_term
@@ -62,7 +62,10 @@ def localize_paper(
         for i, chain in enumerate(kept):
             share = part_of(progress, i / len(kept), (i + 1) / len(kept))
             bones = np.array(sorted(chain))
-            candidates.append(fit_chain(sequence, bones, chain_vertices(body, vertices, bones), settings, share))
+            fit = fit_chain(sequence, bones, chain_vertices(body, vertices, bones), settings, share)
+            candidates.append(fit)
+            scores = {"yaw_deg": fit.yaw_deg, "one_way": fit.one_way, "chamfer": fit.chamfer}
+            tell(progress, Found("chain", i, {"bones": bones, "of": len(kept), **scores}))
     pruned = np.array([sorted(chain) for chain in kept])
     if whole:
         start = Start.on_markers(sequence)

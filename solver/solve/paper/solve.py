@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.body.model import Body
-from solver.progress import Progress, part_of, silent
+from solver.progress import Found, Progress, part_of, silent, tell
 from solver.solve.paper.descent import minimise
 from solver.solve.paper.energies import (
     marker_term,
@@ -52,7 +52,9 @@ def solve_paper(
     yaws = []
     for i in range(settings.yaws):
         share = part_of(progress, i / (settings.yaws + 1), (i + 1) / (settings.yaws + 1))
-        yaws.append(fit_yaw(sequence, found, 360.0 * i / settings.yaws, settings, share))
+        fit = fit_yaw(sequence, found, 360.0 * i / settings.yaws, settings, share)
+        yaws.append(fit)
+        tell(progress, Found("yaw", i, {"start_deg": fit.start_deg, "one_way": fit.one_way, "of": settings.yaws}))
     chosen = int(np.argmin([fit.one_way for fit in yaws]))
     share = part_of(progress, settings.yaws / (settings.yaws + 1), 1.0)
     vertex, refined = refine(sequence, yaws[chosen], settings, share)

@@ -201,7 +201,6 @@ def test_the_default_methods_descents(results: Mapping[str, Any]) -> None:
     for curve, own in zip(curves, ranked.candidates):
         assert curve.energy.tolist() == list(own.trace)
         assert curve.iteration.tolist() == list(range(1, len(own.trace) + 1))
-        assert curve.trace is None
 
 
 def test_the_papers_descents_keep_bodies_to_scrub_through(paper_results: Mapping[str, Any], body: Body) -> None:
