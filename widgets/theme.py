@@ -158,6 +158,8 @@ def _style(look: Colours) -> str:
     return f"""
         QToolTip {{ color: {css(look.text)}; background: {css(look.raised)}; border: 1px solid {css(look.border)};
                     padding: 4px; }}
+        QCheckBox::indicator:unchecked {{ border: 1px solid {css(look.faint)}; border-radius: 2px;
+                    background: {css(look.base)}; width: 11px; height: 11px; }}
         QToolButton:focus, QPushButton:focus {{ border: 1px solid {css(look.accent)}; border-radius: 3px; }}
         QToolButton {{ border: 1px solid transparent; border-radius: 3px; padding: 3px; }}
         QToolButton:hover {{ background: {css(look.grid)}; }}

@@ -1,0 +1,1 @@
+"""Dialogs and overlays; they ask, and leave the work to whoever listens."""
