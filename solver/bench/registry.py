@@ -27,5 +27,7 @@ def method_named(name: str) -> Variant:
 def with_ablations(names: tuple[str, ...]) -> tuple[str, ...]:
     """Each method followed by those that are named after it."""
     return tuple(
-        dict.fromkeys(other for name in names for other in VARIANTS if other == name or other.startswith(f"{name}-"))
+        dict.fromkeys(
+            other for name in names for other in (name, *(known for known in VARIANTS if known.startswith(f"{name}-")))
+        )
     )
