@@ -95,7 +95,11 @@ class Document:
         return self._writer.problem
 
     def new(
-        self, inputs: Mapping[str, Path], settings: Mapping[str, Mapping[str, Any]] | None = None, name: str = ""
+        self,
+        inputs: Mapping[str, Path],
+        settings: Mapping[str, Mapping[str, Any]] | None = None,
+        edits: Mapping[str, Mapping[str, Any]] | None = None,
+        name: str = "",
     ) -> None:
         """Begin a session from files.
 
@@ -103,6 +107,7 @@ class Document:
         ----------
         inputs : files by the name of the graph's source; ``marker_file`` among them
         settings : how they are read, tables by stage
+        edits : what was decided while they were chosen (points that are no markers of the person), tables by stage
         name : what to call its folder, the marker file's name by default
 
         Raises
@@ -112,7 +117,7 @@ class Document:
         files = {name: InputFile(existing(Path(path), name.replace("_", " "))) for name, path in inputs.items()}
         if "marker_file" not in files:
             raise InputError("a session begins with one", "the marker file", "choose a C3D, TRC, CSV or TSV file")
-        session = Session(Path(), files, dict(settings or {}))
+        session = Session(Path(), files, dict(settings or {}), dict(edits or {}))
         session.stage_settings(graph_of(session))
         self.close()
         folder = self.home.new_folder(name or files["marker_file"].path.stem)

@@ -120,7 +120,7 @@ class Results:
     def close(self) -> None:
         """Load nothing more ahead, and forget what is held."""
         if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
+            self._pool.shutdown(wait=False, cancel_futures=True)
         with self._lock:
             self._held.clear()
             self._coming.clear()

@@ -127,7 +127,9 @@ class StageBoard:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The stages of the method, in the order they are shown."""
+        """The stages of the method, in the order they are shown; none while no session is open."""
+        if not self.document.is_open:
+            return ()
         order = list(TITLES)
         return tuple(sorted(self.keys, key=lambda name: order.index(name) if name in order else len(order)))
 

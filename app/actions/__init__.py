@@ -1,0 +1,15 @@
+"""Everything that can be done in the window, as a table that needs no window."""
+
+from __future__ import annotations
+
+from app.actions.action import MENUS, Action, Actions, Asks
+from app.actions.edit_actions import EDIT_ACTIONS
+from app.actions.play_actions import PLAY_ACTIONS
+from app.actions.run_actions import RUN_ACTIONS
+from app.actions.session_actions import SESSION_ACTIONS
+from app.actions.view_actions import VIEW_ACTIONS
+
+ACTIONS = (*SESSION_ACTIONS, *EDIT_ACTIONS, *VIEW_ACTIONS, *PLAY_ACTIONS, *RUN_ACTIONS)
+"""Every action, in the order of the menus."""
+
+__all__ = ["ACTIONS", "MENUS", "Action", "Actions", "Asks"]

@@ -1,0 +1,220 @@
+"""Decisions: undo and redo, groups of markers, the pinned candidate, the offset, the range."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from app.actions.action import Action, Asks, Reason, first, needs, needs_session
+from app.models import edits, group_edits
+from app.models.edits import Edit
+from app.models.workbench import Workbench
+from solver.segment import Segmentation
+
+_needs_groups = needs("segment", "the groups of markers are not there")
+
+
+def _selected(count: int, what: str) -> Reason:
+    def why_not(bench: Workbench) -> str:
+        return "" if len(bench.selection.markers) >= count else what
+
+    return why_not
+
+
+def _undo(bench: Workbench, asks: Asks) -> None:
+    bench.document.undo()
+
+
+def _redo(bench: Workbench, asks: Asks) -> None:
+    bench.document.redo()
+
+
+def _nothing_undone(bench: Workbench) -> str:
+    if reason := needs_session(bench):
+        return reason
+    return "" if bench.document.history.undo_sentence else "nothing has been decided yet"
+
+
+def _nothing_redone(bench: Workbench) -> str:
+    if reason := needs_session(bench):
+        return reason
+    return "" if bench.document.history.redo_sentence else "nothing was undone"
+
+
+def _all(bench: Workbench, asks: Asks) -> None:
+    bench.selection.select_markers(range(len(bench.board.current["markers"].labels)))
+
+
+def _none(bench: Workbench, asks: Asks) -> None:
+    bench.selection.clear()
+
+
+def _invert(bench: Workbench, asks: Asks) -> None:
+    bench.selection.select_markers(range(len(bench.board.current["markers"].labels)), "toggle")
+
+
+def _whole_groups(bench: Workbench, asks: Asks) -> None:
+    groups = bench.board.current["segment"].clusters
+    touched = {int(groups[m]) for m in bench.selection.markers} - {-1}
+    bench.selection.select_markers(np.flatnonzero(np.isin(groups, list(touched))), "add")
+
+
+GroupEdit = Callable[..., Edit]
+
+
+def _group(edit: GroupEdit) -> Callable[[Workbench, Asks], object]:
+    def run(bench: Workbench, asks: Asks) -> None:
+        found: Segmentation = bench.board.current["segment"]
+        labels = bench.board.current["markers"].labels
+        bench.document.apply(edit(bench.document.session, found, bench.selection.markers, labels))
+
+    return run
+
+
+def _take_in(bench: Workbench, asks: Asks) -> None:
+    labels = bench.board.current["markers"].labels
+    bench.document.apply(group_edits.take_in(bench.document.session, bench.selection.markers, labels))
+
+
+def _as_cut(bench: Workbench, asks: Asks) -> None:
+    bench.document.apply(group_edits.undo_all(bench.document.session))
+
+
+def _pin(bench: Workbench, asks: Asks) -> None:
+    row = bench.selection.candidate
+    assert row is not None
+    bench.document.apply(edits.pin_candidate(bench.document.session, row))
+
+
+def _no_candidate(bench: Workbench) -> str:
+    if reason := needs("orient", "there are no ranked candidates")(bench):
+        return reason
+    return "" if bench.selection.candidate is not None else "no candidate is selected"
+
+
+def _unpin(bench: Workbench, asks: Asks) -> None:
+    bench.document.apply(edits.unpin_candidate(bench.document.session))
+
+
+def _not_pinned(bench: Workbench) -> str:
+    if reason := needs_session(bench):
+        return reason
+    return "" if getattr(bench.board.settings.get("fit"), "candidate", None) is not None else "no candidate is pinned"
+
+
+def _found_offset(bench: Workbench, asks: Asks) -> None:
+    bench.document.apply(edits.find_offset(bench.document.session))
+
+
+def _no_offset(bench: Workbench) -> str:
+    if reason := needs_session(bench):
+        return reason
+    return "" if bench.board.settings["sync"].offset is not None else "the offset is the one found already"
+
+
+def _range(bench: Workbench, asks: Asks) -> None:
+    assert bench.clock.loop is not None
+    bench.document.apply(edits.set_range(bench.document.session, *bench.clock.loop))
+
+
+def _no_loop(bench: Workbench) -> str:
+    if reason := needs_session(bench):
+        return reason
+    return "" if bench.clock.loop else "no range is selected in the timelines"
+
+
+def _whole(bench: Workbench, asks: Asks) -> None:
+    bench.document.apply(edits.set_range(bench.document.session, None, None))
+
+
+def _no_range(bench: Workbench) -> str:
+    if reason := needs_session(bench):
+        return reason
+    settings = bench.board.settings["markers"]
+    return "" if (settings.start, settings.stop) != (None, None) else "the whole recording is solved already"
+
+
+_ONE = _selected(1, "no marker is selected")
+_TWO = _selected(2, "fewer than two markers are selected")
+_MARKERS = needs("markers", "the markers have not been read")
+
+EDIT_ACTIONS = (
+    Action("edit.undo", "Undo", "Edit", "Take the last decision back.", _undo, "Ctrl+Z", _nothing_undone),
+    Action("edit.redo", "Redo", "Edit", "Decide again what was undone.", _redo, "Ctrl+Shift+Z Ctrl+Y", _nothing_redone),
+    Action("select.all", "Select all markers", "Edit", "Select every marker.", _all, "Ctrl+A", _MARKERS),
+    Action("select.none", "Select nothing", "Edit", "Let go of the selection.", _none, "Esc"),
+    Action("select.invert", "Invert selection", "Edit", "Select the other markers.", _invert, "Ctrl+I", _MARKERS),
+    Action(
+        "select.groups",
+        "Select whole groups",
+        "Edit",
+        "Select all markers of the groups that selected markers belong to.",
+        _whole_groups,
+        "G",
+        first(_needs_groups, _ONE),
+    ),
+    Action(
+        "groups.merge",
+        "Merge groups",
+        "Edit",
+        "Make one group of the groups of the selected markers.",
+        _group(group_edits.merge),
+        "M",
+        first(_needs_groups, _TWO),
+    ),
+    Action(
+        "groups.split",
+        "Split off",
+        "Edit",
+        "Give the selected markers a group of their own.",
+        _group(group_edits.split),
+        "S",
+        first(_needs_groups, _ONE),
+    ),
+    Action(
+        "groups.leave_out",
+        "Leave out",
+        "Edit",
+        "Leave the selected markers out of the solve.",
+        _group(group_edits.leave_out),
+        "Del",
+        first(_needs_groups, _ONE),
+    ),
+    Action(
+        "groups.take_in",
+        "Take in again",
+        "Edit",
+        "Have selected markers back that were left out.",
+        _take_in,
+        "Shift+Del",
+        first(_needs_groups, _ONE),
+    ),
+    Action(
+        "groups.as_cut",
+        "Groups as the cut makes them",
+        "Edit",
+        "Take back every merge, split, move and marker left out.",
+        _as_cut,
+        why_not=_needs_groups,
+    ),
+    Action("candidate.pin", "Pin candidate", "Edit", "Go on from the selected candidate.", _pin, "P", _no_candidate),
+    Action("candidate.unpin", "Unpin candidate", "Edit", "Go on from the best candidate.", _unpin, "", _not_pinned),
+    Action(
+        "offset.found",
+        "Use the offset found",
+        "Edit",
+        "Take the offset of the video that the motion says, instead of the one given.",
+        _found_offset,
+        why_not=_no_offset,
+    ),
+    Action(
+        "range.selected",
+        "Solve the selected range",
+        "Edit",
+        "Solve only the range that is selected in the timelines.",
+        _range,
+        why_not=_no_loop,
+    ),
+    Action("range.whole", "Solve the whole recording", "Edit", "Solve all frames.", _whole, why_not=_no_range),
+)

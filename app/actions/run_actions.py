@@ -1,0 +1,70 @@
+"""Running stages and choosing the method."""
+
+from __future__ import annotations
+
+from app.actions.action import Action, Asks, first, needs_idle, needs_session
+from app.models import edits
+from app.models.fields import title
+from app.models.workbench import Said, Workbench
+from solver.pipeline.request import Method
+
+
+def run_until(bench: Workbench, stage: str | None) -> None:
+    """Run up to a stage, or all; says so where there is nothing to do."""
+    if not bench.runner.run(None if stage is None else [stage]):
+        what = "All results are" if stage is None else f"{title(stage)} is"
+        bench.say(Said("note", f"{what} there for these settings already"))
+
+
+def _all(bench: Workbench, asks: Asks) -> None:
+    run_until(bench, None)
+
+
+def _selected(bench: Workbench, asks: Asks) -> None:
+    run_until(bench, bench.selection.stage)
+
+
+def _no_stage(bench: Workbench) -> str:
+    return "" if bench.selection.stage in bench.board.names else "no stage is selected"
+
+
+def _problem(bench: Workbench) -> str:
+    return "" if bench.board.problem is None else str(bench.board.problem).rstrip(".")
+
+
+def _stop(bench: Workbench, asks: Asks) -> None:
+    bench.runner.cancel()
+    bench.say(Said("note", "Stopped; what was finished stays"))
+
+
+def _nothing_runs(bench: Workbench) -> str:
+    return "" if bench.runner.running else "nothing runs"
+
+
+def _method(method: Method, name: str, help: str) -> Action:
+    def run(bench: Workbench, asks: Asks) -> None:
+        bench.document.apply(edits.set_method(bench.document.session, method))
+
+    def on(bench: Workbench) -> bool:
+        return bench.document.is_open and bench.document.session.run.method == method
+
+    return Action(f"method.{method}", name, "Run", help, run, why_not=needs_session, checked=on)
+
+
+_READY = first(needs_session, needs_idle, _problem)
+
+RUN_ACTIONS = (
+    Action("run.all", "Run all", "Run", "Have every result for the settings as they are.", _all, "F5 Ctrl+R", _READY),
+    Action(
+        "run.to",
+        "Run to the selected stage",
+        "Run",
+        "Have the selected stage's result, and what it stands on.",
+        _selected,
+        "F6",
+        first(_READY, _no_stage),
+    ),
+    Action("run.stop", "Stop", "Run", "Stop what runs; what is finished stays.", _stop, "Ctrl+.", _nothing_runs),
+    _method("bundle", "Default method", "Fit by bundle adjustment with the video's landmarks."),
+    _method("paper", "Published method", "Fit as Milef et al. (2024) did, for comparison."),
+)

@@ -1,0 +1,302 @@
+"""All models of one window, joined: what one of them does, the others follow."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from app.models.clock import Clock, Timing
+from app.models.display import Display
+from app.models.document import Document
+from app.models.edits import Edit
+from app.models.frames import VideoFrames
+from app.models.home import Home
+from app.models.jobs import Runner
+from app.models.results import Ref
+from app.models.selection import Selection
+from app.models.signal import Signal
+from app.models.stages import Failure, StageBoard
+from solver.errors import Cancelled, InputError, MarkerscopeError
+from solver.pipeline.run import run_stages
+
+Level = Literal["note", "warning", "error"]
+_DRAWN = ("markers", "sync", "segment", "fit")
+"""Stages whose results the clock and the selection stand on."""
+
+
+@dataclass(frozen=True)
+class Said:
+    """Something to tell the user: what happened, where, and what to do about it."""
+
+    level: Level
+    what: str
+    where: str = ""
+    remedy: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """All of it."""
+        place = f"{self.where}: " if self.where else ""
+        return f"{place}{self.what}{f'; {self.remedy}' if self.remedy else ''}."
+
+
+class Workbench:
+    """The models of a window.
+
+    Parameters
+    ----------
+    home : the user's folders
+    now : s, of a clock of the computer's that never goes back
+
+    Attributes
+    ----------
+    document, board, runner, clock, selection, display : see their classes
+    frames : of the session's video, None without one
+    said : emitted with what the user has to be told
+    video_changed : emitted when there is another video, or more of it
+    opened : emitted when a session was opened or closed, after all else has followed
+    """
+
+    def __init__(self, home: Home, now: Callable[[], float] = time.monotonic) -> None:
+        self.now = now
+        self.document = Document(home)
+        self.document.changed.connect(self._forget)  # before anything else follows
+        self.board = StageBoard(self.document)
+        self.runner = Runner(self.board, now)
+        self.clock = Clock()
+        self.selection = Selection()
+        self.display = Display()
+        self.frames: VideoFrames | None = None
+        self.said: Signal[[Said]] = Signal()
+        self.video_changed: Signal[[]] = Signal()
+        self.opened: Signal[[]] = Signal()
+        self._reading: _Reading | None = None
+        self._shown: dict[str, str] = {}
+        self._to_restore: Mapping[str, Any] | None = None
+        self._clusters: np.ndarray | None = None
+        self._bones: np.ndarray | None = None
+        self.document.changed.connect(self._document_changed)
+        self.board.changed.connect(self._follow)
+        self.runner.failed.connect(self._failed)
+
+    @property
+    def busy(self) -> bool:
+        """Whether something runs that ``tick`` has to watch: it is to be called often then."""
+        return self.runner.running or self.clock.playing or self._reading is not None or self._waits_for_video
+
+    @property
+    def reading(self) -> bool:
+        """Whether the marker file is being read, so that there is nothing to show yet."""
+        return self._reading is not None
+
+    def tick(self) -> None:
+        """Let everything move on that has its own time: playing, running stages, results and frames that arrive."""
+        self.runner.poll()
+        self.board.results.poll()
+        if self.frames is not None:
+            self.frames.poll()
+        if self._reading is not None and self._reading.done:
+            self._read()
+        self.clock.tick(self.now())
+
+    def attempt(self, act: Callable[[], object]) -> bool:
+        """Do something that the user asked for; what cannot be done is said. Returns whether it was done."""
+        try:
+            act()
+        except Cancelled:
+            return False
+        except MarkerscopeError as error:
+            self.say_error(error)
+            return False
+        return True
+
+    def apply(self, edit: Edit) -> bool:
+        """Carry a decision out, or say why it cannot be."""
+        return self.attempt(lambda: self.document.apply(edit))
+
+    def open(self, path: Path, although_open: bool = False) -> bool:
+        """Open a session, or say why it cannot be."""
+        done = self.attempt(lambda: self.document.open(path, although_open))
+        if done and self.document.recovered:
+            self.say(Said("note", "What had not been saved is back", self.document.name, "save the session to keep it"))
+        return done
+
+    def say(self, said: Said) -> None:
+        """Tell the user something."""
+        self.said.emit(said)
+
+    def say_error(self, error: Exception) -> None:
+        """Tell the user why something could not be done."""
+        if isinstance(error, InputError):
+            self.say(Said("error", error.what, error.where or "", error.remedy))
+        else:
+            self.say(Said("error", str(error).rstrip(".")))
+
+    def remember(self, **parts: Any) -> None:
+        """Write down how the window looks, so that it opens as it was: the parts given, and what the models know."""
+        if self.document.is_open and self._to_restore is None:
+            self.document.set_view(
+                time=self.clock.time,
+                speed=self.clock.speed,
+                loop=self.clock.loop,
+                selection=self.selection.state(),
+                display=self.display.state(),
+                compared=sorted([ref.stage, ref.key] for ref in self.board.compared),
+                **parts,
+            )
+
+    def close(self, keep_untitled: bool = False) -> None:
+        """Close the session; what runs is stopped, what was not saved is given up."""
+        self.runner.cancel()
+        self.remember()
+        self.document.close(keep_untitled)
+
+    def _forget(self, another: bool) -> None:
+        """Let go of what belongs to the session before."""
+        if not another:
+            return
+        self.runner.cancel()
+        self.clock.stop()
+        self._shown, self._reading, self._clusters, self._bones = {}, None, None, None
+        self._to_restore = dict(self.document.view) if self.document.is_open else None
+        if not self.document.is_open:
+            self.clock.set_timing(Timing())
+            self.selection.clear()
+        self.selection.set_groups(None, None)
+
+    def _document_changed(self, another: bool) -> None:
+        self._follow_video()
+        if another:
+            self.opened.emit()
+
+    def _follow(self) -> None:
+        """Have clock and selection stand on the results there are; those not in memory come later."""
+        if not self.document.is_open:
+            return
+        if "markers" in self.board.keys and not self.runner.running:
+            self._begin_reading()
+        for stage in _DRAWN:
+            latest = self.board.latest(stage)
+            if latest is None or self._shown.get(stage) == latest[0]:
+                continue
+            if stage in ("sync", "segment") or self.board.results.is_loaded(stage, latest[0]):
+                self._show(stage, latest[0])
+            else:
+                self.board.results.loaded.connect(self._loaded)
+                self.board.results.load_ahead(stage, latest[0])
+
+    def _loaded(self, ref: Ref) -> None:
+        latest = self.board.latest(ref.stage) if ref.stage in _DRAWN else None
+        if latest is not None and latest[0] == ref.key and self._shown.get(ref.stage) != ref.key:
+            self._show(ref.stage, ref.key)
+
+    def _show(self, stage: str, key: str) -> None:
+        self._shown[stage] = key
+        value = self.board.results.get(stage, key)
+        if stage == "markers":
+            frames = len(value.positions)
+            self.clock.set_timing(replace(self.clock.timing, first=value.first_time, rate=value.rate, frames=frames))
+            self._restore()
+        elif stage == "sync":
+            self.clock.set_sync(value.offset, value.rate_ratio)
+        elif stage == "segment":
+            self._clusters = value.clusters
+        else:
+            self._bones = value.marker_joint
+        self.selection.set_groups(self._clusters, self._bones)
+
+    def _restore(self) -> None:
+        """Have it as it was left, once it is known how long the recording is."""
+        view, self._to_restore = self._to_restore, None
+        if not view:
+            return
+        loop, speed, at = view.get("loop"), view.get("speed"), view.get("time")
+        if isinstance(speed, int | float):
+            self.clock.set_speed(speed)
+        if isinstance(loop, list | tuple) and len(loop) == 2 and all(isinstance(end, int | float) for end in loop):
+            self.clock.set_loop((float(loop[0]), float(loop[1])))
+        if isinstance(at, int | float):
+            self.clock.seek(float(at))
+        for name, model in (("selection", self.selection), ("display", self.display)):
+            state = view.get(name)
+            if isinstance(state, Mapping):
+                model.restore(state)
+        compared = view.get("compared")
+        for row in compared if isinstance(compared, list) else ():
+            if isinstance(row, list) and len(row) == 2 and all(isinstance(part, str) for part in row):
+                self.board.compare(row[0], row[1], True)
+
+    def _begin_reading(self) -> None:
+        """Read the markers as soon as they are others, so that there is something to look at before anything is run."""
+        if self._reading is None and self.board.state("markers") in ("not run", "stale"):
+            self._reading = _Reading(self.document.session, self.board.keys["markers"])
+
+    def _read(self) -> None:
+        reading, self._reading = self._reading, None
+        assert reading is not None
+        error = reading.error
+        if error is None:
+            self.board.end()
+        else:
+            if isinstance(error, InputError):
+                failure = Failure("markers", reading.key, error.what, error.where or "", error.remedy)
+            else:
+                failure = Failure("markers", reading.key, str(error).rstrip("."))
+            self.board.end(failure)
+            self._failed(failure)
+
+    def _follow_video(self) -> None:
+        """Have the frames of the session's video."""
+        given = self.document.session.inputs.get("video_file") if self.document.is_open else None
+        path = None if given is None else given.path
+        if path == (None if self.frames is None else self.frames.path):
+            return
+        if self.frames is not None:
+            self.frames.close()
+        self.frames = None if path is None else VideoFrames(path)
+        if self.frames is not None:
+            self.frames.grown.connect(self._more_video)
+            self.frames.arrived.connect(self.video_changed.emit)
+        self._more_video()
+
+    def _more_video(self) -> None:
+        times = () if self.frames is None else self.frames.times
+        if len(times) != len(self.clock.timing.video) or (self.frames is not None and self.frames.done):
+            self.clock.timing = replace(self.clock.timing, video=times)
+            self.clock.changed.emit()
+        if self.frames is not None and self.frames.done and self.frames.problem is not None:
+            self.say_error(self.frames.problem)
+        self.video_changed.emit()
+
+    @property
+    def _waits_for_video(self) -> bool:
+        return self.frames is not None and not self.frames.done
+
+    def _failed(self, failure: Failure) -> None:
+        self.say(Said("error", failure.what, failure.where, failure.remedy))
+
+
+class _Reading:
+    """The marker file being read in a thread."""
+
+    def __init__(self, session: Any, key: str) -> None:
+        self.key = key
+        self.error: Exception | None = None
+        self._thread = threading.Thread(target=self._run, args=(session,), name="markers", daemon=True)
+        self._thread.start()
+
+    @property
+    def done(self) -> bool:
+        return not self._thread.is_alive()
+
+    def _run(self, session: Any) -> None:
+        try:
+            run_stages(session, ["markers"])
+        except Exception as error:
+            self.error = error
