@@ -36,6 +36,7 @@ def to_rgb(picture: QImage) -> np.ndarray:
 def draw_focus(painter: QPainter, area: QRect) -> None:
     """A line about a picture that has the keyboard."""
     colour = theme.qcolour(theme.colours().accent, 160)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
     for side in (
         QRect(0, 0, area.width(), 1), QRect(0, area.height() - 1, area.width(), 1),
         QRect(0, 1, 1, area.height() - 2), QRect(area.width() - 1, 1, 1, area.height() - 2),

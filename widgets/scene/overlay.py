@@ -80,10 +80,10 @@ class Places:
         """Take the first of boxes (N, 4) of which no part is taken, and return which; -1 where there is none."""
         held = self._boxes[: self._count]
         low, high = boxes[:, None, :2] < held[None, :, 2:], boxes[:, None, 2:] > held[None, :, :2]
-        free = ~(low & high).all(axis=2).any(axis=1)
-        first = int(free.argmax())
-        if not free[first]:
+        free = np.flatnonzero(~np.any((low & high).all(axis=2), axis=1))
+        if not len(free):
             return -1
+        first = int(free[0])
         self.hold(boxes[first : first + 1])
         return first
 

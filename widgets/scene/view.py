@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, QTimer, Signal
@@ -13,11 +12,11 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from widgets import theme
 from widgets.images import draw_focus, of_rgba, save, to_rgb
-from widgets.scene.camera import Camera
 from widgets.scene.legend import ColourBar, Legend, Rgb
 from widgets.scene.navigate import HELP, Navigator
 from widgets.scene.picking import nearest_point, nearest_segment, points_in_box
 from widgets.scene.sheet import Sheet
+from widgets.scene.sight import Sight
 from widgets.scene.stage import Stage
 
 REST_MS = 140
@@ -25,7 +24,7 @@ REST_MS = 140
 _REACH_MARKER, _REACH_BONE = 10.0, 7.0  # px from what a click is meant for
 
 
-class Scene3D(QWidget):
+class Scene3D(Sight):
     """Markers, bodies, skeletons and lines over a floor.
 
     Everything is in metres in the lab, z up; colours are 0 to 255. Layers that need no name are "markers", "trails",
@@ -42,7 +41,6 @@ class Scene3D(QWidget):
     bone_clicked = Signal(str, int, object)
     background_clicked = Signal(object)
     hovered = Signal(int)
-    camera_changed = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -55,11 +53,7 @@ class Scene3D(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self._stage = stage = Stage(theme.colours())
         self._sheet = Sheet()
-        self._camera = Camera()
         self._navigator = Navigator(self)
-        self._facing = 0.0
-        self._follow = False
-        self._followed: np.ndarray | None = None
         self._picture: QImage | None = None
         self._dirty = True
         self._smoothing: Iterator[np.ndarray | None] | None = None
@@ -145,76 +139,7 @@ class Scene3D(QWidget):
         self._sheet.legend = None if entries is None else Legend(title, entries)
         self.update()
 
-    # The camera
-
-    @property
-    def camera(self) -> Camera:
-        """Where one looks from."""
-        return self._camera
-
-    def set_camera(self, camera: Camera) -> None:
-        """Look from there."""
-        if camera != self._camera:
-            self._camera = camera
-            self._changed()
-            self.camera_changed.emit()
-
-    def set_facing(self, direction: Sequence[float]) -> None:
-        """Where the person faces, (x, y), so that "front" and "left" are the person's; the view stays."""
-        self._facing = float(np.arctan2(direction[1], direction[0]))
-
-    def view_from(self, preset: str) -> None:
-        """One of :data:`widgets.scene.PRESETS`, or "fit" to see everything from where one looks."""
-        self.set_camera(self._camera.turned_to(preset, self._facing)) if preset != "fit" else self.frame()
-
-    def frame(self, points: np.ndarray | None = None) -> None:
-        """Come as near as shows points (N, 3) m, all that is visible where None."""
-        wanted = self._stage.points() if points is None else points
-        self.set_camera(self._camera.fitted(wanted, self.width() / max(1, self.height())))
-
-    def frame_selected(self) -> None:
-        """Come near the selected markers, all of them where none is."""
-        chosen = [i for i in self._sheet.selected if i < len(self._stage.markers)]
-        self.frame(self._stage.markers[chosen] if chosen else None)
-
-    def set_parallel(self, parallel: bool) -> None:
-        """Whether things keep their size however far they are."""
-        self.set_camera(Camera.of_state(self._camera.state() | {"parallel": parallel}))
-
-    def set_follow(self, follow: bool) -> None:
-        """Whether the camera goes along with the point of :meth:`follow_point`."""
-        self._follow = follow
-
-    def follow_point(self, point: np.ndarray | None) -> None:
-        """Where the followed thing, the pelvis say, is now, (3) m; None or NaN where nobody knows."""
-        if point is None or not np.isfinite(point).all():
-            return
-        before, self._followed = self._followed, np.array(point, dtype=float)
-        if self._follow and before is not None:
-            self.set_camera(self._camera.moved(self._followed - before))
-
-    def camera_state(self) -> dict[str, Any]:
-        """Plain numbers that :meth:`restore_camera` takes."""
-        return self._camera.state() | {"follow": self._follow, "facing": self._facing}
-
-    def restore_camera(self, state: Mapping[str, Any]) -> None:
-        """Look from where :meth:`camera_state` was taken."""
-        self._follow = bool(state.get("follow", False))
-        facing = state.get("facing", 0.0)
-        self._facing = float(facing) if isinstance(facing, int | float) else 0.0
-        self.set_camera(Camera.of_state(state))
-
-    def orbit(self, right: float, up: float) -> None:
-        """Turn about the target, rad."""
-        self.set_camera(self._camera.orbited(right, up))
-
-    def pan(self, right: float, down: float) -> None:
-        """Shift what is seen, px."""
-        self.set_camera(self._camera.panned(right, down, self.height()))
-
-    def zoom(self, factor: float, at: tuple[float, float] | None = None) -> None:
-        """Nearer by ``factor``, towards a pixel."""
-        self.set_camera(self._camera.zoomed(factor, at, (self.width(), self.height())))
+    # What the mouse does, and what is under the pointer
 
     def set_tool(self, tool: str) -> None:
         """What a plain drag does: "orbit", or "select" for a box about markers."""
@@ -222,12 +147,6 @@ class Scene3D(QWidget):
             raise ValueError(f"no tool is called {tool}")
         self._navigator.tool = tool
         self.setCursor(Qt.CursorShape.CrossCursor if tool == "select" else Qt.CursorShape.ArrowCursor)
-
-    # What is under the pointer
-
-    def project(self, points: np.ndarray) -> np.ndarray:
-        """Pixels (N, 2) of this widget where points (N, 3) m are seen, NaN behind the camera."""
-        return self._camera.project(points, self.width(), self.height())[0]
 
     def marker_at(self, at: tuple[float, float]) -> int:
         """The marker at a pixel, -1 for none."""
@@ -365,6 +284,10 @@ class Scene3D(QWidget):
         """Keys of :data:`widgets.scene.navigate.HELP`; others go on to the window."""
         if not self._navigator.key(event):
             super().keyPressEvent(event)
+
+    def _shown_points(self, selected: bool) -> np.ndarray:
+        chosen = [i for i in self._sheet.selected if i < len(self._stage.markers)]
+        return self._stage.markers[chosen] if selected and chosen else self._stage.points()
 
     def _changed(self) -> None:
         self._dirty = True

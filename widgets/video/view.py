@@ -7,16 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QEvent, QLineF, QPointF, QRectF, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import (
-    QColor,
-    QFontMetricsF,
     QImage,
     QKeyEvent,
     QMouseEvent,
     QPainter,
     QPaintEvent,
-    QPen,
     QResizeEvent,
     QWheelEvent,
 )
@@ -25,10 +22,10 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from widgets import palette, theme
 from widgets.images import draw_focus, of_rgb, save
 from widgets.video.outline import Outline
+from widgets.video.paint import draw_landmarks, draw_lines, draw_markers, draw_text
 from widgets.video.zoom import Zoom
 
 LAYERS = ("picture", "landmarks", "markers", "body", "skeleton")
-_LANDMARK = (240, 228, 66)
 _REACH = 10.0  # px of the screen
 _CLICK_PX = 4.0
 HELP = (
@@ -277,65 +274,15 @@ class VideoView(QWidget):
             painter.drawImage(area, self._picture)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if "body" not in self._hidden:
-            self._draw_lines(painter, self._body, QColor(0, 0, 0, 130), 3.0)
-            self._draw_lines(painter, self._body, theme.qcolour(self._body_colour), 1.5)
+            draw_lines(painter, self._segments(self._body), self._body_colour, 1.5)
         if "skeleton" not in self._hidden:
-            self._draw_lines(painter, self._bones, QColor(0, 0, 0, 150), 5.0)
-            self._draw_lines(painter, self._bones, theme.qcolour(self._bone_colour), 2.5)
+            draw_lines(painter, self._segments(self._bones), self._bone_colour, 2.5)
         if "landmarks" not in self._hidden:
-            self._draw_landmarks(painter)
+            draw_landmarks(painter, self.to_widget(self._landmarks), self._links, self._visibility)
         if "markers" not in self._hidden:
-            self._draw_markers(painter)
+            draw_markers(painter, self.to_widget(self._markers), self._colours, self._selected)
         if self._text:
-            self._draw_text(painter)
+            draw_text(painter, self._text, self.width())
 
-    def _draw_lines(self, painter: QPainter, segments: np.ndarray, colour: QColor, width: float) -> None:
-        if not len(segments):
-            return
-        painter.setPen(QPen(colour, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
-        ends = self.to_widget(segments.reshape(-1, 2)).reshape(-1, 4)
-        painter.drawLines([QLineF(*line) for line in ends[np.isfinite(ends).all(axis=1)].tolist()])
-
-    def _draw_landmarks(self, painter: QPainter) -> None:
-        at = self.to_widget(self._landmarks)
-        for a, b in self._links:
-            if np.isfinite(at[[a, b]]).all():
-                sure = min(self._visibility[a], self._visibility[b])
-                line = QLineF(*at[a].tolist(), *at[b].tolist())
-                for colour, width in ((QColor(0, 0, 0, int(40 + 110 * sure)), 3.5), (_faded(sure), 1.8)):
-                    painter.setPen(QPen(colour, width))
-                    painter.drawLine(line)
-        painter.setPen(QPen(QColor(0, 0, 0, 170), 1.0))
-        for (x, y), sure in zip(at, self._visibility):
-            if not np.isnan(x):
-                painter.setBrush(_faded(sure))
-                painter.drawEllipse(QPointF(x, y), 3.2, 3.2)
-
-    def _draw_markers(self, painter: QPainter) -> None:
-        at = self.to_widget(self._markers)
-        painter.setPen(QPen(QColor(0, 0, 0, 200), 1.2))
-        for (x, y), (r, g, b) in zip(at, self._colours):
-            if not np.isnan(x):
-                painter.setBrush(QColor(int(r), int(g), int(b)))
-                painter.drawEllipse(QPointF(x, y), 4.5, 4.5)
-        painter.setBrush(Qt.BrushStyle.NoBrush)
-        for i in self._selected:
-            if i < len(at) and not np.isnan(at[i, 0]):
-                for colour, width in ((QColor(255, 255, 255, 200), 4.0), (QColor(*palette.SELECTED), 2.0)):
-                    painter.setPen(QPen(colour, width))
-                    painter.drawEllipse(QPointF(*at[i].tolist()), 8.0, 8.0)
-
-    def _draw_text(self, painter: QPainter) -> None:
-        metrics = QFontMetricsF(painter.font())
-        room = self.width() - 32.0
-        shown = metrics.elidedText(self._text, Qt.TextElideMode.ElideRight, room)
-        box = QRectF(8, 8, metrics.horizontalAdvance(shown) + 16, metrics.height() + 8)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(0, 0, 0, 150))
-        painter.drawRoundedRect(box, 4, 4)
-        painter.setPen(QColor(255, 255, 255))
-        painter.drawText(box, int(Qt.AlignmentFlag.AlignCenter), shown)
-
-
-def _faded(sure: float) -> QColor:
-    return QColor(*_LANDMARK, int(60 + 195 * sure))
+    def _segments(self, segments: np.ndarray) -> np.ndarray:
+        return self.to_widget(segments.reshape(-1, 2)).reshape(-1, 4)
