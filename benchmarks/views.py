@@ -146,7 +146,8 @@ def loaded(folder: Path) -> dict[str, Any]:
     session = load_session(folder)
     graph = graph_of(session)
     keys = stage_keys(graph, session.sources(SOURCES), session.stage_settings(graph))
-    return {stage.name: session.store.get(stage.name, keys[stage.name], stage.result) for stage in graph}
+    found = {stage.name: session.store.get(stage.name, keys[stage.name], stage.result) for stage in graph}
+    return found | {"markers": found["clean"].markers}
 
 
 def made_up(body: Body, frames: int, markers: int) -> dict[str, Any]:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.markers import Markers
 from solver.solve.results import FittedMotion
+
+if TYPE_CHECKING:
+    from solver.clean.clean import Cut
 
 MEASURED, FILLED, OUTLIER, LOST = range(4)
 STATE_NAMES = ("measured", "filled", "outlier taken out", "lost")
@@ -64,22 +68,22 @@ class MarkerTracks:
         return (1 - share) * self.markers.positions[left] + share * self.markers.positions[left + 1]
 
 
-def tracks_of(markers: Markers, motion: FittedMotion | None = None, measured: Markers | None = None) -> MarkerTracks:
+def tracks_of(markers: Markers, motion: FittedMotion | None = None, cut: Cut | None = None) -> MarkerTracks:
     """The markers of a solve with the state of every sample.
 
     Parameters
     ----------
-    markers : as the solve sees them
+    markers : after cleaning, where there was any
     motion : a fit of the same frames, to stand in where markers are lost
-    measured : the same trajectories before cleaning, to tell which samples were taken out
+    cut : what cleaning took out; what the file itself had filled there was no measurement
     """
     present = _present(markers)
     state = np.where(present, np.uint8(MEASURED), np.uint8(LOST))
     if markers.filled is not None:
         state[markers.filled & present] = FILLED
-    if measured is not None:
-        was = _present(measured) if measured.filled is None else _present(measured) & ~measured.filled
-        state[was & (state != MEASURED)] = OUTLIER
+    if cut is not None:
+        own = ~cut.filled
+        state[cut.frame[own], cut.marker[own]] = OUTLIER
     return MarkerTracks(markers, state, None if motion is None else motion.placed)
 
 

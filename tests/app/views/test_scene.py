@@ -11,6 +11,7 @@ from app.views.bodies import of_motion
 from app.views.colours import by_bone, by_cluster, by_residual, by_selection, by_state
 from app.views.scene import extent, markers_at, middle, misses, ties, trails
 from app.views.tracks import FILLED, LOST, MEASURED, OUTLIER, pooled, tracks_of
+from solver.clean.clean import Cut
 from solver.markers import Markers
 from solver.segment import segment
 from tests.app.views.conftest import Made
@@ -18,20 +19,19 @@ from widgets import palette
 
 
 def test_states_tell_measured_filled_taken_out_and_lost() -> None:
-    raw = np.ones((4, 2, 3))
-    raw[1, 0] = np.nan  # lost, then filled
-    raw[2, 0] = np.nan  # lost, stays so
-    cleaned = raw.copy()
-    cleaned[1, 0] = 1.5
-    cleaned[0, 1], cleaned[3, 1] = np.nan, 2.0  # taken out; taken out and filled
+    positions = np.ones((4, 2, 3))
+    positions[2, 0] = np.nan  # lost, stays so
+    positions[0, 1] = np.nan  # taken out
     filled = np.zeros((4, 2), bool)
-    filled[1, 0] = filled[3, 1] = True
-    markers = Markers(cleaned, 10.0, ("a", "b"), filled=filled)
-    state = tracks_of(markers, measured=Markers(raw, 10.0, ("a", "b"))).state
-    assert state[:, 0].tolist() == [MEASURED, FILLED, LOST, MEASURED]
+    filled[1, 0] = True  # lost, then filled
+    filled[3, 1] = True  # taken out, then filled
+    filled[3, 0] = True  # filled by the file, taken out, filled again
+    markers = Markers(positions, 10.0, ("a", "b"), filled=filled)
+    frame, marker = np.array([0, 3, 3]), np.array([1, 1, 0])
+    cut = Cut(frame, marker, np.zeros((3, 3)), np.array([False, False, True]))
+    state = tracks_of(markers, cut=cut).state
+    assert state[:, 0].tolist() == [MEASURED, FILLED, LOST, FILLED]
     assert state[:, 1].tolist() == [OUTLIER, MEASURED, MEASURED, OUTLIER]
-    of_the_file = Markers(cleaned, 10.0, ("a", "b"), filled=filled)
-    assert tracks_of(markers, measured=of_the_file).state[:, 1].tolist() == [LOST, MEASURED, MEASURED, FILLED]
     assert tracks_of(markers).state[:, 1].tolist() == [LOST, MEASURED, MEASURED, FILLED]
 
 

@@ -21,6 +21,7 @@ from app.views.timelines import (
     video_row,
 )
 from app.views.tracks import tracks_of
+from solver.clean.clean import Cut
 from solver.markers import Markers
 from solver.prior import PosePrior
 from solver.sync import Sync
@@ -90,19 +91,15 @@ def test_strips_come_in_the_order_asked_for(made: Made) -> None:
 
 def test_filled_and_taken_out_samples_show(made: Made) -> None:
     present = made.markers.present
-    filled = np.zeros(present.shape, bool)
-    t, m = np.argwhere(present)[0]
-    gap = tuple(np.argwhere(~present)[0])
-    filled[t, m] = filled[gap] = True
-    cleaned = made.markers.positions.copy()
-    cleaned[gap] = 0.5
-    u, n = np.argwhere(present)[-1]
-    cleaned[u, n] = np.nan
-    row = presence_row(tracks_of(replace(made.markers, positions=cleaned, filled=filled), measured=made.markers))
+    positions, filled = made.markers.positions.copy(), np.zeros(present.shape, bool)
+    gap, taken = tuple(np.argwhere(~present)[0]), tuple(np.argwhere(present)[-1])
+    positions[gap], filled[gap], positions[taken] = 0.5, True, np.nan
+    cut = Cut(np.array([taken[0]]), np.array([taken[1]]), np.zeros((1, 3)), np.zeros(1, bool))
+    row = presence_row(tracks_of(replace(made.markers, positions=positions, filled=filled), cut=cut))
     assert row.filled is not None and row.outlier is not None
     assert np.argwhere(row.filled).tolist() == [list(gap)]
-    # What was filled although it had been measured was taken out before.
-    assert row.outlier[u, n] and row.outlier[t, m] and not row.present[u, n]
+    assert np.argwhere(row.outlier).tolist() == [list(taken)]
+    assert not row.present[gap] and not row.present[taken]
 
 
 def test_the_overview_dips_where_one_frame_is_lost() -> None:
