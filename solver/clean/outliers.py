@@ -35,7 +35,7 @@ class OutlierSettings:
     """
 
     method: OutlierMethod = "local"
-    ratio: float = 7.0
+    ratio: float = 6.0
     least: float = 0.005
     window: float = 0.5
     longest: int = 5
@@ -48,8 +48,9 @@ class OutlierSettings:
         for name in ("ratio", "least", "window", "prominence"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} is {getattr(self, name):g} and has to be above 0")
-        if self.around < 0 or self.passes < 1 or self.longest < 1:
-            raise ValueError("around has to be 0 or more, passes and longest 1 or more")
+        for name, lowest in (("around", 0), ("passes", 1), ("longest", 1)):
+            if getattr(self, name) < lowest:
+                raise ValueError(f"{name} is {getattr(self, name)} and has to be {lowest} or more")
 
 
 def find_outliers(positions: np.ndarray, rate: float, settings: OutlierSettings) -> np.ndarray:

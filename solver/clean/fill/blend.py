@@ -46,19 +46,37 @@ def drift(frames: np.ndarray, residual: np.ndarray, gap: Gap, ends: int) -> floa
         return np.inf
     if ends == 0:
         return float(np.linalg.norm(residual - residual.mean(axis=0), axis=1).mean())
-    lag = gap.length + 1 if ends == 2 else gap.length
-    known = frames[frames + lag <= frames[-1]]
-    if len(known) == 0:  # never seen for as long as that: what it wanders about its mean, and as much again
-        return 2 * float(np.linalg.norm(residual - residual.mean(axis=0), axis=1).mean())
-    nearest = np.argsort(np.abs(known + lag / 2 - (gap.first + gap.last) / 2), kind="stable")
-    tried = known[nearest[: 4 * _TRIALS : 4]] if len(known) > 4 * _TRIALS else known[:: max(1, len(known) // _TRIALS)]
+    length, times = gap.length, 1
+    while length >= 1:
+        error = _tried(frames, residual, length + (ends == 2), (gap.first + gap.last) / 2, ends)
+        if error is not None:
+            return times * error
+        # Never seen for as long as that: what half the length leaves, and as much again.
+        length, times = length // 2, times * 2
+    return np.inf
 
-    def at(times: np.ndarray) -> np.ndarray:
-        return residual[np.clip(np.searchsorted(frames, times), 0, len(frames) - 1)]
 
-    first, last = at(tried), at(tried + lag)
+def _tried(frames: np.ndarray, residual: np.ndarray, lag: int, near: float, ends: int) -> float | None:
+    """Mean error of blending over ``lag`` frames, at the places nearest to ``near``; None where none is known."""
+    starts = frames[frames + lag <= frames[-1]]
+    if len(starts) > 4 * _TRIALS:
+        starts = starts[np.argsort(np.abs(starts + lag / 2 - near), kind="stable")[: 4 * _TRIALS : 4]]
+    elif len(starts) > _TRIALS:
+        starts = starts[:: len(starts) // _TRIALS]
+    if len(starts) == 0:
+        return None
+    times = starts[:, None] + lag * np.array([0.0, *_INSIDE, 1.0])
+    after = np.clip(np.searchsorted(frames, times), 1, len(frames) - 1)
+    left, right = frames[after - 1], frames[after]
+    # Between two known frames further apart than usual there is a gap, about which nothing can be tried.
+    whole = (right - left <= max(1, np.median(np.diff(frames)))).all(axis=1)
+    if not whole.any():
+        return None
+    share = ((times - left) / (right - left))[whole, :, None]
+    value = (1 - share) * residual[after[whole] - 1] + share * residual[after[whole]]
+    first, last = value[:, 0], value[:, -1]
     errors = [
-        np.linalg.norm(at(tried + lag * f) - ((1 - f) * first + f * last if ends == 2 else first), axis=1)
-        for f in _INSIDE
+        np.linalg.norm(value[:, k] - ((1 - f) * first + f * last if ends == 2 else first), axis=1)
+        for k, f in enumerate(_INSIDE, start=1)
     ]
     return float(np.mean(errors))

@@ -97,7 +97,10 @@ def fill_regression(positions: np.ndarray, rate: float, settings: FillSettings) 
 def _round(scene: _Scene, gaps: list[Gap], most: int) -> Parts:
     """Every gap that regression can fill; those with the same neighbours share their learning."""
     alike = defaultdict(list)
+    seen = scene.present.sum(axis=1)
     for gap in gaps:
+        if seen[gap.first : gap.last + 1].min() < FEWEST:
+            continue  # neighbours that are all filled themselves know nothing
         group = scene.near.nearest(gap.marker, throughout(scene.known, gap), most)
         alike[gap.marker, tuple(group)].append(gap)
     found: Parts = {}
