@@ -24,6 +24,8 @@ from solver.pipeline.session import session_document, session_from
 
 JOURNAL = "journal.json"
 VIEW = "view.json"
+_PAUSE_S = 0.3
+"""Between two writes, so that a camera that is turned does not keep the disk busy."""
 _KEPT = 60
 """Steps that are written down; older ones could not be undone after a crash."""
 
@@ -95,6 +97,7 @@ class Writer:
         self._waiting: dict[Path, Mapping[str, Any] | None] = {}
         self._changed = threading.Condition()
         self._busy = False
+        self._hurried = False
         self._closed = False
         self._thread: threading.Thread | None = None
 
@@ -110,7 +113,10 @@ class Writer:
     def flush(self) -> None:
         """Wait until everything is written."""
         with self._changed:
+            self._hurried = True
+            self._changed.notify_all()
             self._changed.wait_for(lambda: not self._waiting and not self._busy)
+            self._hurried = False
 
     def close(self) -> None:
         """Write what is left, and end the thread."""
@@ -125,14 +131,16 @@ class Writer:
     def _run(self) -> None:
         while True:
             with self._changed:
-                self._busy = False
-                self._changed.notify_all()
                 self._changed.wait_for(lambda: self._waiting or self._closed)
                 if not self._waiting:
                     return
                 waiting, self._waiting, self._busy = self._waiting, {}, True
             for path, content in waiting.items():
                 self._put(path, content)
+            with self._changed:
+                self._busy = False
+                self._changed.notify_all()
+                self._changed.wait_for(lambda: self._hurried or self._closed, _PAUSE_S)
 
     def _put(self, path: Path, content: Mapping[str, Any] | None) -> None:
         try:

@@ -34,15 +34,16 @@ def wait(bench: Workbench, until: Callable[[], object]) -> None:
     raise AssertionError("it never came")
 
 
-def settle(bench: Workbench) -> None:
-    wait(bench, lambda: not bench.busy)
-    wait(bench, lambda: bench.clock.timing.frames > 0)
+def settle(bench: Workbench, video: bool = False) -> None:
+    wait(bench, lambda: bench.clock.timing.frames > 0 and not bench.reading)
+    if video:
+        wait(bench, lambda: not bench.busy)
 
 
 def test_a_marker_file_is_there_to_look_at_before_anything_is_run(bench: Workbench) -> None:
     bench.document.new({"marker_file": DEMO_MARKERS, "video_file": DEMO_VIDEO})
     assert bench.reading
-    settle(bench)
+    settle(bench, video=True)
     assert bench.board.state("markers") == "cached"
     assert bench.board.state("segment") == "not run"
     assert bench.clock.span == pytest.approx((0.0, 9.99))
@@ -74,7 +75,7 @@ def test_what_cannot_be_read_is_said_once(bench: Workbench, tmp_path: Path) -> N
 
 def test_clock_and_selection_stand_on_the_results(bench: Workbench, session: Session) -> None:
     assert bench.open(session.folder)
-    settle(bench)
+    settle(bench, video=True)
     wait(bench, lambda: bench.board.results.is_loaded("fit", bench.board.keys["fit"]))
     bench.tick()
     assert bench.clock.timing.offset == 0.37
