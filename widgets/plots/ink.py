@@ -16,8 +16,8 @@ from widgets.theme import colours, qcolour
 
 _CONTRAST = 3.0
 """What WCAG asks of lines and signs."""
-_NO_AA = 1500
-"""Points beyond which a line is drawn without smoothing: it is an envelope then, and has no slopes to smooth."""
+_DENSE = 1000
+"""Points beyond which a line is thin and not smoothed: it is an envelope then, and Qt's wide joins would cost 20 ms."""
 
 
 def colour(rgb: np.ndarray | tuple[int, ...], alpha: int = 255) -> QColor:
@@ -64,7 +64,13 @@ def polygon(x: np.ndarray, y: np.ndarray) -> QPolygonF:
 def polyline(painter: QPainter, x: np.ndarray, y: np.ndarray) -> None:
     """A line that is interrupted where ``y`` is not finite; single points are drawn as dots."""
     good = np.isfinite(x) & np.isfinite(y)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing, len(x) <= _NO_AA)
+    dense = len(x) > _DENSE
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, not dense)
+    if dense:
+        thin = painter.pen()
+        thin.setWidthF(1.0)
+        thin.setStyle(Qt.PenStyle.SolidLine)
+        painter.setPen(thin)
     for start, end in runs(good):
         if end - start == 1:
             painter.drawPoint(QPointF(x[start], y[start]))

@@ -53,8 +53,8 @@ class PresencePainter:
         """Three pixels a marker at least, and room for two lines of text."""
         return max(2.2 * em, 3.0 * self.markers)
 
-    def paint(self, painter: QPainter, area: QRectF, x: Scale, selected: frozenset[int]) -> None:
-        """Draw the strips as one picture, and frames about what is selected."""
+    def paint(self, painter: QPainter, area: QRectF, x: Scale) -> None:
+        """Draw the strips as one picture."""
         look = colours()
         if not self.markers or not len(self.row.time):
             return
@@ -77,11 +77,16 @@ class PresencePainter:
             for k in range(1, self.markers):
                 y = round(area.top() + k * strip)
                 painter.drawLine(QPointF(area.left(), y), QPointF(area.right(), y))
+        self._paint_key(painter, area, np.array(look.accent) if self.row.colours is None else self.row.colours[0])
+
+    def paint_selected(self, painter: QPainter, area: QRectF, selected: frozenset[int]) -> None:
+        """Frame the strips of markers, over the picture."""
+        strip = area.height() / max(self.markers, 1)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         painter.setPen(pen(palette.SELECTED, 1.5))
         painter.setBrush(Qt.BrushStyle.NoBrush)
         for low, high in runs(np.isin(self.numbers, list(selected))):
             painter.drawRect(QRectF(area.left() + 1, area.top() + low * strip, area.width() - 2, (high - low) * strip))
-        self._paint_key(painter, area, np.array(look.accent) if self.row.colours is None else self.row.colours[0])
 
     def _paint_key(self, painter: QPainter, area: QRectF, seen: np.ndarray) -> None:
         """Say below the row's name what the shades mean, where there is room."""
@@ -142,7 +147,7 @@ class StatePainter:
         """A line of text."""
         return 1.7 * em
 
-    def paint(self, painter: QPainter, area: QRectF, x: Scale, selected: frozenset[int]) -> None:
+    def paint(self, painter: QPainter, area: QRectF, x: Scale) -> None:
         """Draw each pixel in the colour of its highest state."""
         if not len(self.row.time):
             return
@@ -194,7 +199,7 @@ class CurvePainter:
         """Values to pixels."""
         return Scale(*self.limits, area.bottom() - 3, area.top() + 3)
 
-    def paint(self, painter: QPainter, area: QRectF, x: Scale, selected: frozenset[int]) -> None:
+    def paint(self, painter: QPainter, area: QRectF, x: Scale) -> None:
         """Draw the axis, the lines and their names."""
         metrics = QFontMetricsF(painter.font())
         y = self.y_scale(area)
@@ -246,7 +251,7 @@ class OffsetPainter:
         left, right = (x.at(t) for t in self.ends())
         return QRectF(left, area.top() + 3, max(right - left, 6), area.height() - 6)
 
-    def paint(self, painter: QPainter, area: QRectF, x: Scale, selected: frozenset[int]) -> None:
+    def paint(self, painter: QPainter, area: QRectF, x: Scale) -> None:
         """Draw the bar, both motions, and where the automatic offset would put it."""
         look, bar, row = colours(), self.bar(area, x), self.row
         painter.setClipRect(area)

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QToolButton, QToolTip, QWidget
 
 from widgets import palette
 from widgets.plots.ink import colour, elided, em, pen
-from widgets.plots.row_painters import OffsetPainter, RowPainter, offset_text, painter_of
+from widgets.plots.row_painters import OffsetPainter, PresencePainter, RowPainter, offset_text, painter_of
 from widgets.plots.rows import CurveRow, Row
 from widgets.plots.scales import Scale
 from widgets.plots.time_window import TimeWindow
@@ -74,7 +74,7 @@ class TimelineRows(QWidget):
         """Frame their strips."""
         if markers != self._selected:
             self._selected = markers
-            self._repaint()
+            self.update()
 
     def offset(self) -> float | None:
         """Where the video's bar is, s; None without one."""
@@ -121,6 +121,9 @@ class TimelineRows(QWidget):
         painter.drawPixmap(part, self._picture, source)
         x = self.clock_scale()
         painter.setClipRect(QRectF(self.margin, 0, self.width() - self.margin, self.height()))
+        for row, area in zip(self._rows, self._areas):
+            if self._selected and isinstance(row, PresencePainter) and area.intersects(QRectF(part)):
+                row.paint_selected(painter, area, self._selected)
         if self._time.range is not None:
             look = colours()
             a, b = (x.at(t) for t in self._time.range)
@@ -149,7 +152,7 @@ class TimelineRows(QWidget):
             right = area.left() - 8 - (self._axis_width() if isinstance(row.row, CurveRow) else 0)
             name = QRectF(8, area.top(), max(right - 8, 10), metrics.height() + 2)
             elided(painter, name, row.row.name)
-            row.paint(painter, area, x, self._selected)
+            row.paint(painter, area, x)
             painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(pen(look.border))
