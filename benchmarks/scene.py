@@ -47,10 +47,11 @@ def main() -> None:
         sys.exit(scene.problem)
     whole, coarse = made_up_body(), coarse_body()
     bodies = {f"{len(v)} vertices": (v, f) for v, f in ((whole[0], whole[1]), coarse)}
+    skeleton = (whole[2], whole[3])
     if options.steps:
         time_rows(scene, whole, coarse, first, options.steps)
     if options.updates:
-        memory_rows(scene, {name: step(scene, body, whole[2:], 0.6) for name, body in bodies.items()}, options.updates)
+        memory_rows(scene, {name: step(scene, body, skeleton, 0.6) for name, body in bodies.items()}, options.updates)
 
 
 def time_rows(
@@ -62,9 +63,9 @@ def time_rows(
     bodies = {f"{len(v)} vertices": (v, f) for v, f in ((whole[0], whole[1]), coarse)}
     for name, body in bodies.items():
         for opacity, look in ((1.0, "solid"), (0.6, "see-through")):
-            row(f"everything, body of {name}, {look}", step(scene, body, whole[2:], opacity), steps)
-    row("everything but the body", step(scene, None, whole[2:], 1.0), steps)
-    show = step(scene, bodies[next(iter(bodies))], whole[2:], 0.6)
+            row(f"everything, body of {name}, {look}", step(scene, body, (whole[2], whole[3]), opacity), steps)
+    row("everything but the body", step(scene, None, (whole[2], whole[3]), 1.0), steps)
+    show = step(scene, bodies[next(iter(bodies))], (whole[2], whole[3]), 0.6)
     show(0)
     markers, table = made_up_markers(whole[0], 60)[0], palette.categorical(60)
 

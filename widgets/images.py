@@ -21,10 +21,12 @@ def of_rgba(picture: np.ndarray) -> QImage:
 
 
 def of_rgb(picture: np.ndarray) -> QImage:
-    """Qt's picture of (H, W, 3) uint8, copied."""
+    """Qt's picture of (H, W, 3) uint8, copied into the format that it draws fastest."""
     whole = np.ascontiguousarray(picture)
     height, width = whole.shape[:2]
-    return QImage(whole.data, width, height, 3 * width, QImage.Format.Format_RGB888).copy()
+    return QImage(whole.data, width, height, 3 * width, QImage.Format.Format_RGB888).convertToFormat(
+        QImage.Format.Format_RGB32
+    )
 
 
 def to_rgb(picture: QImage) -> np.ndarray:

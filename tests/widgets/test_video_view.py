@@ -84,12 +84,7 @@ def test_markers_landmarks_and_bones_lie_on_their_pixels_at_any_zoom(video: Vide
     wanted = {(40, 40): RED, (160, 80): GREEN, (100, 20): (240, 228, 66), (150, 100): (9, 250, 9)}
     for angle in (0, 120, 360):
         wheel(video, (250.0, 200.0), angle)
-        for pixel, colour in (
-            ((40, 40), RED),
-            ((160, 80), GREEN),
-            ((100, 20), (240, 228, 66)),
-            ((150, 100), (9, 250, 9)),
-        ):
+        for pixel, colour in wanted.items():
             x, y = video.to_widget(np.array([pixel]))[0]
             if 5 < x < 495 and 5 < y < 395:
                 got = picture(video)[int(y), int(x)]

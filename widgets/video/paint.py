@@ -18,7 +18,8 @@ def draw_lines(painter: QPainter, ends: np.ndarray, rgb: tuple[int, int, int], w
     lines = [QLineF(*line) for line in ends[np.isfinite(ends).all(axis=1)].tolist()]
     if lines:
         for colour, wide in ((QColor(0, 0, 0, 140), width + 2.0), (QColor(*rgb), width)):
-            painter.setPen(QPen(colour, wide, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+            # Square ends close the joints as round ones do, at a fraction of the time.
+            painter.setPen(QPen(colour, wide, Qt.PenStyle.SolidLine, Qt.PenCapStyle.SquareCap))
             painter.drawLines(lines)
 
 
