@@ -26,7 +26,7 @@ from solver.errors import Cancelled, InputError, MarkerscopeError
 from solver.pipeline.run import run_stages
 
 Level = Literal["note", "warning", "error"]
-_DRAWN = ("markers", "sync", "segment", "fit")
+_DRAWN = ("markers", "segment", "fit")
 """Stages whose results the clock and the selection stand on."""
 
 
@@ -181,15 +181,26 @@ class Workbench:
             return
         if "markers" in self.board.keys and not self.runner.running:
             self._begin_reading()
+        self._follow_sync()
         for stage in _DRAWN:
             latest = self.board.latest(stage)
             if latest is None or self._shown.get(stage) == latest[0]:
                 continue
-            if stage in ("sync", "segment") or self.board.results.is_loaded(stage, latest[0]):
+            if stage == "segment" or self.board.results.is_loaded(stage, latest[0]):
                 self._show(stage, latest[0])
             else:
                 self.board.results.loaded.connect(self._loaded)
                 self.board.results.load_ahead(stage, latest[0])
+
+    def _follow_sync(self) -> None:
+        """Lay the video as the user said, at once; else as it was found last."""
+        settings = self.board.settings.get("sync")
+        latest = self.board.latest("sync")
+        if settings is not None and settings.offset is not None:
+            self.clock.set_sync(settings.offset, settings.rate_ratio or 1.0)
+        elif latest is not None:
+            found = self.board.results.get("sync", latest[0])
+            self.clock.set_sync(found.offset, found.rate_ratio)
 
     def _loaded(self, ref: Ref) -> None:
         latest = self.board.latest(ref.stage) if ref.stage in _DRAWN else None
@@ -203,8 +214,6 @@ class Workbench:
             frames = len(value.positions)
             self.clock.set_timing(replace(self.clock.timing, first=value.first_time, rate=value.rate, frames=frames))
             self._restore()
-        elif stage == "sync":
-            self.clock.set_sync(value.offset, value.rate_ratio)
         elif stage == "segment":
             self._clusters = value.clusters
         else:

@@ -81,6 +81,10 @@ def test_clock_and_selection_stand_on_the_results(bench: Workbench, session: Ses
     assert bench.clock.timing.offset == 0.37
     assert bench.clock.marker_frame == 0
     assert bench.clock.video_frame == round((2.0 - 0.37) * 30)
+    bench.apply(edits.set_offset(bench.document.session, 0.5))
+    assert bench.clock.timing.offset == 0.5, "an offset that is given holds before anything is run"
+    bench.document.undo()
+    assert bench.clock.timing.offset == 0.37
     bones = bench.board.current["fit"].marker_joint
     bench.selection.select_bone(int(bones[bones >= 0][0]))
     assert bench.selection.markers == set(np.flatnonzero(bones == bench.selection.bone).tolist())
