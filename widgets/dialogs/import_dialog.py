@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
+from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
@@ -24,7 +25,6 @@ from widgets.panels.fields import SettingsForm
 from widgets.panels.stage_data import FieldSpec
 from widgets.plots.curves import BoxDelegate
 from widgets.plots.scales import number
-from widgets.theme import colours
 
 _RARE = 0.05
 
@@ -50,6 +50,8 @@ class ImportDialog(QDialog):
         self._said, self._notes, self._problem = QLabel(), QLabel(), QLabel()
         for label in (self._said, self._notes, self._problem):
             label.setWordWrap(True)
+        self._notes.setForegroundRole(QPalette.ColorRole.PlaceholderText)
+        self._problem.setForegroundRole(QPalette.ColorRole.BrightText)
         self.preview, self.form, self.points = PointsPreview(), SettingsForm(), QTreeWidget()
         self.points.setHeaderLabels(["Point", "Seen"])
         self.points.setRootIsDecorated(False)
@@ -112,10 +114,8 @@ class ImportDialog(QDialog):
             self._fill(shown)
         self.preview.set_points(shown.points, self._unticked())
         self._notes.setText("\n".join(shown.notes))
-        self._notes.setStyleSheet(f"color: rgb{colours().faint}")
         self._notes.setVisible(bool(shown.notes))
         self._problem.setText(shown.problem)
-        self._problem.setStyleSheet(f"color: rgb{colours().error}")
         self._problem.setVisible(bool(shown.problem))
         self._allow()
 

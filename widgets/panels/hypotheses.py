@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QFont, QHelpEvent, QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPixmap
+from PySide6.QtGui import QFont, QHelpEvent, QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPalette, QPixmap
 from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
@@ -152,7 +152,7 @@ class HypothesisCard(QFrame):
             if on
         ]
         badge = QLabel(", ".join(badges))
-        badge.setStyleSheet(f"color: rgb{colours().accent}")
+        badge.setForegroundRole(QPalette.ColorRole.Link)
         self.pin = QPushButton(icon("pin"), "In use" if card.in_use else "Pin")
         self.pin.setToolTip("Hold this answer, and go on from it; can be undone")
         self.pin.setEnabled(not card.in_use)

@@ -72,6 +72,8 @@ class StageCard(QFrame):
         self.toggle.toggled.connect(self._open)
         self.bar, self._left, self.stop_button = QProgressBar(), QLabel(), QPushButton(icon("stop"), "Stop")
         self._left.setWordWrap(True)
+        for label in (self._seconds, self._left):
+            label.setForegroundRole(QPalette.ColorRole.PlaceholderText)
         self.stop_button.setToolTip("End the run; what was computed before stays")
         self.stop_button.clicked.connect(self.stop)
         self.form = SettingsForm()
@@ -191,8 +193,6 @@ class StageCard(QFrame):
         side = self.fontMetrics().height()
         self._icon.setPixmap(icon(glyph, ink).pixmap(QSize(side, side), self.devicePixelRatioF()))
         self._state.setStyleSheet(f"color: rgb{getattr(look, ink)}")
-        self._seconds.setStyleSheet(f"color: rgb{look.faint}")
-        self._left.setStyleSheet(f"color: rgb{look.faint}")
         self._headline.setStyleSheet(f"color: rgb{look.error if self._data.state == 'failed' else look.text}")
 
     def _show_earlier(self, results: tuple[EarlierResult, ...]) -> None:

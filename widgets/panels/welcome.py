@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QDragEnterEvent, QDropEvent, QFont
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QFont, QPalette
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from widgets.icons import icon
-from widgets.theme import colours
 
 
 @dataclass(frozen=True)
@@ -142,4 +141,4 @@ class WelcomePage(QWidget):
         bold = QFont(self.font())
         bold.setBold(True)
         self._heading.setFont(bold)
-        self._drop.setStyleSheet(f"color: rgb{colours().faint}")
+        self._drop.setForegroundRole(QPalette.ColorRole.PlaceholderText)

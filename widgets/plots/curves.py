@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtGui import QPainter
+from PySide6.QtGui import QPainter, QPalette
 from PySide6.QtWidgets import (
     QFrame,
     QLabel,
@@ -75,6 +75,7 @@ class CurvesView(QWidget):
         self.plots.seeked.connect(self.seeked)
         self._title = QLabel()
         self._title.setWordWrap(True)
+        self._title.setForegroundRole(QPalette.ColorRole.PlaceholderText)
         scroll = QScrollArea()
         scroll.setWidget(self.plots)
         scroll.setWidgetResizable(True)
@@ -111,7 +112,6 @@ class CurvesView(QWidget):
         self._title.setText(
             f"{convention}{zero}, degrees{'. Dashed: compared with.' if dashed else ''}" if plots else ""
         )
-        self._title.setStyleSheet(f"color: rgb{colours().faint}")
         if not again:
             self._fill()
         self._show()
