@@ -46,6 +46,7 @@ def presence_row(
         None if colours is None else colours[order],
         tuple(tracks.markers.labels[m] for m in order),
         "When each marker was measured; a gap is where it was lost.",
+        order,
     )
 
 
