@@ -102,7 +102,7 @@ class ConvergencePlot(QWidget):
             painter.setPen(pen(legible(curve.colour), 2.6 if k == self._chosen else 1.2))
             values = np.where(curve.energy > 0, curve.energy, np.nan)
             polyline(painter, x.pixel(np.asarray(curve.iteration, float)), y.pixel(values))
-        if 0 <= self._chosen < len(self._curves):
+        if 0 <= self._chosen < len(self._curves) and len(self._curves[self._chosen].energy):
             self._paint_cursor(painter, area, x, y)
         painter.setClipping(False)
 

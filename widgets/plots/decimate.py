@@ -47,7 +47,7 @@ class Counts:
     def __init__(self, flags: np.ndarray) -> None:
         self.flags = np.ascontiguousarray(flags).view(np.uint8)
         whole = len(flags) // BLOCK * BLOCK
-        blocks = self.flags[:whole].reshape(-1, BLOCK, flags.shape[1]).sum(axis=1, dtype=np.uint8)
+        blocks = self.flags[:whole].reshape(whole // BLOCK, BLOCK, flags.shape[1]).sum(axis=1, dtype=np.uint8)
         rest = self.flags[whole:].sum(axis=0, dtype=np.uint8)[None]
         self.blocks = np.concatenate([blocks, rest]) if len(flags) > whole else blocks
 
