@@ -155,7 +155,7 @@ def _solve_options(solve: argparse.ArgumentParser) -> None:
 
 
 def _bench_options(bench: argparse.ArgumentParser) -> None:
-    bench.add_argument("suite", metavar="SUITE", help="accuracy, parts, scaling, ablation or short")
+    bench.add_argument("suite", metavar="SUITE", help="accuracy, parts, scaling, ablation, short or clean")
     bench.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="tables and records (default: %(default)s)")
 
     what = bench.add_argument_group("what is run")

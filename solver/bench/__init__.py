@@ -12,6 +12,10 @@ if TYPE_CHECKING:
 
 def run_bench(request: BenchRequest, progress: Progress) -> Outcome:
     """See ``solver.bench.bench``; loaded when called, so that the command line answers at once."""
+    if request.suite == "clean":
+        from solver.bench.clean import clean_suite
+
+        return clean_suite(request, progress)
     from solver.bench.bench import run_bench as run
 
     return run(request, progress)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from solver.bench.request import BenchRequest
 from solver.clean.fill import METHODS, fill
 from solver.clean.gap_model import GapModel, draw_gaps, draw_shifts, heavy_tailed, read_gap_statistics
 from solver.clean.gaps import Filled, FillSettings
@@ -17,6 +18,7 @@ from solver.clean.outliers import OutlierSettings, find_outliers
 from solver.clean.request import Method, OutlierMethod
 from solver.errors import InputError
 from solver.io.atomic import make_folder, write_text_atomic
+from solver.pipeline.request import Outcome
 from solver.progress import Progress, silent
 
 RATE = 60.0
@@ -148,6 +150,20 @@ def run_clean_bench(
         write_text_atomic(out / "clean.json", json.dumps(_plain(asdict(tables)), indent=1) + "\n")
     progress(1.0, "done")
     return tables
+
+
+def clean_suite(request: BenchRequest, progress: Progress = silent) -> Outcome:
+    """What ``markerscope bench clean`` does.
+
+    Raises
+    ------
+    InputError : no folder of recordings was named, or nothing in it can be used
+    """
+    if request.motions is None or not request.motions.is_dir():
+        raise InputError("names no folder of recordings", "--motions", "name a folder of C3D, TRC or CSV files")
+    tables = run_clean_bench(request.motions, request.gaps, request.out, request.seeds, progress)
+    lines = (*tables.markdown().splitlines(), f"Tables are in {request.out}.")
+    return Outcome(summary={"suite": "clean", "out": str(request.out), **asdict(tables)}, lines=lines)
 
 
 def read_recordings(folder: Path) -> tuple[list[tuple[str, np.ndarray, float]], tuple[str, ...]]:

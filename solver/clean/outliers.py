@@ -14,6 +14,7 @@ _AGREE = 0.5
 """Of a jump: the way back may differ from the way out by this share, and what is between may move by as much."""
 _SMOOTH = 7
 """Frames about one from which its usual velocity is taken."""
+_LEAST_BESIDE, _MOST_BESIDE = 0.2, 0.85
 _ROUNDS = 6
 
 
@@ -99,17 +100,24 @@ def _peaks(positions: np.ndarray, rate: float, settings: OutlierSettings) -> np.
         size = np.full(found.shape, np.nan)
         size[1:-1] = np.linalg.norm(positions[1:-1] - 0.5 * (positions[:-2] + positions[2:]), axis=2)
         usual = _usual(size, rate, settings) if usual is None else usual
-        size = np.nan_to_num(size)
         # The samples beside an outlier have half its acceleration: only the top of each peak is cut.
-        padded = np.pad(size, ((2, 2), (0, 0)))
+        padded = np.pad(np.nan_to_num(size), ((2, 2), (0, 0)))
         top = np.max([padded[k : k + len(size)] for k in (0, 1, 3, 4)], axis=0)
-        new = (size > settings.ratio * usual) & (size > settings.least) & (size >= top)
+        new = (size > settings.ratio * usual) & (size > settings.least) & (size >= top) & _comes_back(size)
         if not new.any():
             break
         found |= new
         frame, marker = np.nonzero(new)
         positions[frame, marker] = 0.5 * (positions[frame - 1, marker] + positions[frame + 1, marker])
     return found
+
+
+def _comes_back(size: np.ndarray) -> np.ndarray:
+    """(T, M) True where the samples beside have about half as much: after a step that stays, one has as much."""
+    beside = np.pad(size, ((1, 1), (0, 0)), constant_values=np.nan)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shares = [beside[k : k + len(size)] / size for k in (0, 2)]
+    return np.all([~(share < _LEAST_BESIDE) & ~(share > _MOST_BESIDE) for share in shares], axis=0)
 
 
 def _excursions(positions: np.ndarray, rate: float, settings: OutlierSettings) -> np.ndarray:

@@ -69,7 +69,7 @@ def _tried(frames: np.ndarray, residual: np.ndarray, lag: int, near: float, ends
     after = np.clip(np.searchsorted(frames, times), 1, len(frames) - 1)
     left, right = frames[after - 1], frames[after]
     # Between two known frames further apart than usual there is a gap, about which nothing can be tried.
-    whole = (right - left <= max(1, np.median(np.diff(frames)))).all(axis=1)
+    whole = (right - left <= max(2 * np.median(np.diff(frames)), 1 + lag // 8)).all(axis=1)
     if not whole.any():
         return None
     share = ((times - left) / (right - left))[whole, :, None]

@@ -149,15 +149,25 @@ def _predicted(scene: _Scene, local: _Local, marker: int, gaps: list[Gap]) -> Pa
         lost = 1 - scene.present[span][:, local.group].mean(axis=0)
         # A neighbour that is filled itself is believed less: errors in the variables are what a ridge stands for.
         ridge = np.repeat(_NOISE_M**2 + (_FILLED_M * lost) ** 2, 3)
-        slope = np.linalg.solve(gram + np.diag(ridge), cross)
+        inverse = np.linalg.inv(gram + np.diag(ridge))
+        slope = inverse @ cross
         ends = ends_of(gap, scene.present[:, marker] & scene.known[:, local.group].all(axis=1))
         rows, at_ends = np.searchsorted(local.frames, span), np.searchsorted(local.frames, ends)
-        guess = (local.features[np.concatenate([rows, at_ends])] - mean_x) @ slope + mean_y
+        around = local.features[np.concatenate([rows, at_ends])] - mean_x
+        guess = around @ slope + mean_y
         inside = guess[: len(span)] + blend(gap, ends, local.target[at_ends] - guess[len(span) :])
         values = np.einsum("nij,nj->ni", local.R_lab_local[rows], inside) + local.centre[rows]
         error = drift(local.frames[local.train], residual, gap, len(ends)) * (1 + float(lost.mean()))
+        error *= _beyond(around[: len(span)], inverse, gram)
         found[gap] = Fill(marker, gap.first, gap.last, "regression", 0.0, error), values
     return found
+
+
+def _beyond(features: np.ndarray, inverse: np.ndarray, gram: np.ndarray) -> float:
+    """How many times surer the frames are that were learnt from: rises where the neighbours are in new places."""
+    usual = float(np.einsum("ij,ji->", inverse, gram))
+    leverage = np.einsum("ni,ij,nj->n", features, inverse, features, optimize=True)
+    return float(np.sqrt(max(1.0, leverage.mean() / max(usual, 1e-12))))
 
 
 def _held_out(X: np.ndarray, Y: np.ndarray, weight: np.ndarray, gram: np.ndarray, cross: np.ndarray) -> np.ndarray:
