@@ -10,7 +10,6 @@ from PySide6.QtGui import (
     QContextMenuEvent,
     QFontMetricsF,
     QHelpEvent,
-    QIcon,
     QImage,
     QKeyEvent,
     QMouseEvent,
@@ -21,8 +20,8 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QMenu, QToolTip, QWidget
 
 from widgets import palette
-from widgets.icons import icon
 from widgets.plots import affinity_paint as paint
+from widgets.plots.affinity_menu import edit_menu
 from widgets.plots.affinity_paint import MM, Places
 from widgets.plots.dendrogram import Dendrogram
 from widgets.plots.ink import colour, em, pen, runs
@@ -307,26 +306,7 @@ class AffinityView(QWidget):
 
     def menu_for(self, markers: list[int]) -> QMenu:
         """What can be done with these markers."""
-        menu = QMenu(self)
-        groups = sorted({int(g) for g in self._clusters[markers] if g >= 0})
-        names = ", ".join(self._labels[m] for m in markers[:4]) + (" …" if len(markers) > 4 else "")
-        menu.addSection(names)
-
-        def add(kind: str, text: str, enabled: bool) -> None:
-            action = menu.addAction(icon(kind), text, lambda: self.edit_requested.emit(kind, markers, -1))
-            action.setEnabled(enabled)
-
-        add("merge", "Merge their groups", len(groups) > 1)
-        add("split", "Split off as a group of their own", bool(groups))
-        moves = menu.addMenu(icon("move"), "Move to group")
-        for group in sorted({int(g) for g in self._clusters if g >= 0} - (set(groups) if len(groups) == 1 else set())):
-            members = np.flatnonzero(self._clusters == group)
-            text = f"{group + 1}: {', '.join(self._labels[m] for m in members[:3])}{' …' if len(members) > 3 else ''}"
-            swatch = QPixmap(16, 16)
-            swatch.fill(colour(self._colours[members[0]]))
-            moves.addAction(QIcon(swatch), text, lambda g=group: self.edit_requested.emit("move", markers, g))
-        add("leave_out", "Leave out", True)
-        return menu
+        return edit_menu(self, markers, self._clusters, self._labels, self._colours, self.edit_requested.emit)
 
     def event(self, event: QEvent) -> bool:
         """Say what lies below the pointer."""

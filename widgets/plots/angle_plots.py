@@ -11,8 +11,8 @@ from PySide6.QtGui import QFontMetricsF, QHelpEvent, QMouseEvent, QPainter, QPai
 from PySide6.QtWidgets import QToolTip, QWidget
 
 from widgets import palette
+from widgets.plots.curve_paint import draw_curve, frame_at
 from widgets.plots.ink import colour, elided, em, legible, pen, y_axis
-from widgets.plots.row_painters import draw_curve, frame_at
 from widgets.plots.rows import Curve
 from widgets.plots.scales import Scale, clock, limits, number, time_ticks
 from widgets.theme import colours

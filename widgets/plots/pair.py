@@ -8,9 +8,9 @@ from PySide6.QtGui import QFontMetricsF, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
 from widgets import palette
+from widgets.plots.curve_paint import frame_at
 from widgets.plots.decimate import envelope
 from widgets.plots.ink import colour, elided, em, pen, polyline, y_axis
-from widgets.plots.row_painters import frame_at
 from widgets.plots.scales import Scale, clock, limits, number, time_ticks
 from widgets.theme import colours
 

@@ -9,9 +9,10 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QFontMetricsF, QPainter
 
 from widgets import palette
-from widgets.plots.decimate import Counts, envelope, presence_picture, shown_frames, strength
-from widgets.plots.ink import colour, elided, image_of, legible, pen, polyline, runs, y_axis
-from widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, Row, StateRow
+from widgets.plots.curve_paint import curve_value, draw_curve, frame_at, legend
+from widgets.plots.decimate import Counts, presence_picture, shown_frames, strength
+from widgets.plots.ink import colour, elided, image_of, pen, runs, y_axis
+from widgets.plots.rows import CurveRow, OffsetRow, PresenceRow, Row, StateRow
 from widgets.plots.scales import Scale, clock, limits, number
 from widgets.theme import colours
 
@@ -26,14 +27,6 @@ def painter_of(row: Row) -> RowPainter:
     if isinstance(row, StateRow):
         return StatePainter(row)
     return CurvePainter(row) if isinstance(row, CurveRow) else OffsetPainter(row)
-
-
-def frame_at(time: np.ndarray, at: float) -> int:
-    """The nearest frame to a moment."""
-    after = int(np.searchsorted(time, at))
-    if after == 0 or after == len(time):
-        return min(after, len(time) - 1)
-    return after if time[after] - at < at - time[after - 1] else after - 1
 
 
 class PresencePainter:
@@ -295,39 +288,3 @@ RowPainter = PresencePainter | StatePainter | CurvePainter | OffsetPainter
 def offset_text(offset: float) -> str:
     """An offset with its sign and unit."""
     return f"{offset:+.3f} s".replace("-", "−")
-
-
-def curve_value(curve: Curve, time: np.ndarray, at: float) -> float:
-    """Value of a curve at a moment; NaN outside of it."""
-    own = time if curve.time is None else curve.time
-    if not len(own) or at < own[0] - 1e-9 or at > own[-1] + 1e-9:
-        return float("nan")
-    return float(curve.values[frame_at(own, at)])
-
-
-def draw_curve(
-    painter: QPainter, area: QRectF, x: Scale, y: Scale, curve: Curve, time: np.ndarray, own: np.ndarray | None = None
-) -> None:
-    """One line, decimated to the pixels of the area."""
-    clock_of = own if own is not None else (time if curve.time is None else curve.time)
-    at, values = envelope(clock_of, curve.values, x.low, x.high, max(1, round(area.width())))
-    painter.setPen(pen(legible(curve.colour), 1.6, curve.dashed))
-    polyline(painter, x.pixel(at), y.pixel(values))
-
-
-def legend(painter: QPainter, area: QRectF, curves: tuple[Curve, ...]) -> None:
-    """Names of the curves in the upper right corner, on a ground of their own."""
-    metrics, look = QFontMetricsF(painter.font()), colours()
-    right = area.right() - 6
-    for curve in reversed(curves):
-        width = metrics.horizontalAdvance(curve.label) + 26
-        if right - width < area.left() + 40:
-            break
-        box = QRectF(right - width, area.top() + 2, width, metrics.height() + 2)
-        painter.fillRect(box, colour(look.base, 215))
-        painter.setPen(pen(legible(curve.colour), 2.0, curve.dashed))
-        middle = box.center().y()
-        painter.drawLine(QPointF(box.left() + 4, middle), QPointF(box.left() + 18, middle))
-        painter.setPen(colour(look.text))
-        painter.drawText(box.adjusted(22, 0, 0, 0), int(Qt.AlignmentFlag.AlignVCenter), curve.label)
-        right -= width + 4

@@ -1,0 +1,50 @@
+"""What can be done with markers of the affinity view."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from PySide6.QtGui import QIcon, QPixmap
+from PySide6.QtWidgets import QMenu, QWidget
+
+from widgets.icons import icon
+from widgets.plots.ink import colour
+
+
+def edit_menu(
+    parent: QWidget,
+    markers: list[int],
+    clusters: np.ndarray,
+    labels: Sequence[str],
+    colours: np.ndarray,
+    ask: Callable[[str, list[int], int], None],
+) -> QMenu:
+    """A menu of edits.
+
+    Parameters
+    ----------
+    markers : those to edit
+    clusters : (M,) group of each marker, -1 for none
+    labels, colours : of all markers; (M, 3) uint8
+    ask : called with kind, markers and target group (-1 where there is none)
+    """
+    menu = QMenu(parent)
+    groups = sorted({int(g) for g in clusters[markers] if g >= 0})
+    menu.addSection(", ".join(labels[m] for m in markers[:4]) + (" …" if len(markers) > 4 else ""))
+
+    def add(kind: str, text: str, enabled: bool) -> None:
+        action = menu.addAction(icon(kind), text, lambda: ask(kind, markers, -1))
+        action.setEnabled(enabled)
+
+    add("merge", "Merge their groups", len(groups) > 1)
+    add("split", "Split off as a group of their own", bool(groups))
+    moves = menu.addMenu(icon("move"), "Move to group")
+    for group in sorted({int(g) for g in clusters if g >= 0} - (set(groups) if len(groups) == 1 else set())):
+        members = np.flatnonzero(clusters == group)
+        text = f"{group + 1}: {', '.join(labels[m] for m in members[:3])}{' …' if len(members) > 3 else ''}"
+        swatch = QPixmap(16, 16)
+        swatch.fill(colour(colours[members[0]]))
+        moves.addAction(QIcon(swatch), text, lambda g=group: ask("move", markers, g))
+    add("leave_out", "Leave out", True)
+    return menu

@@ -1,0 +1,57 @@
+"""Lines over time, their names, and their values at a moment."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QFontMetricsF, QPainter
+
+from widgets.plots.decimate import envelope
+from widgets.plots.ink import colour, legible, pen, polyline
+from widgets.plots.rows import Curve
+from widgets.plots.scales import Scale
+from widgets.theme import colours
+
+
+def frame_at(time: np.ndarray, at: float) -> int:
+    """The nearest frame to a moment."""
+    after = int(np.searchsorted(time, at))
+    if after == 0 or after == len(time):
+        return min(after, len(time) - 1)
+    return after if time[after] - at < at - time[after - 1] else after - 1
+
+
+def curve_value(curve: Curve, time: np.ndarray, at: float) -> float:
+    """Value of a curve at a moment; NaN outside of it."""
+    own = time if curve.time is None else curve.time
+    if not len(own) or at < own[0] - 1e-9 or at > own[-1] + 1e-9:
+        return float("nan")
+    return float(curve.values[frame_at(own, at)])
+
+
+def draw_curve(
+    painter: QPainter, area: QRectF, x: Scale, y: Scale, curve: Curve, time: np.ndarray, own: np.ndarray | None = None
+) -> None:
+    """One line, decimated to the pixels of the area."""
+    clock_of = own if own is not None else (time if curve.time is None else curve.time)
+    at, values = envelope(clock_of, curve.values, x.low, x.high, max(1, round(area.width())))
+    painter.setPen(pen(legible(curve.colour), 1.6, curve.dashed))
+    polyline(painter, x.pixel(at), y.pixel(values))
+
+
+def legend(painter: QPainter, area: QRectF, curves: tuple[Curve, ...]) -> None:
+    """Names of the curves in the upper right corner, on a ground of their own."""
+    metrics, look = QFontMetricsF(painter.font()), colours()
+    right = area.right() - 6
+    for curve in reversed(curves):
+        width = metrics.horizontalAdvance(curve.label) + 26
+        if right - width < area.left() + 40:
+            break
+        box = QRectF(right - width, area.top() + 2, width, metrics.height() + 2)
+        painter.fillRect(box, colour(look.base, 215))
+        painter.setPen(pen(legible(curve.colour), 2.0, curve.dashed))
+        middle = box.center().y()
+        painter.drawLine(QPointF(box.left() + 4, middle), QPointF(box.left() + 18, middle))
+        painter.setPen(colour(look.text))
+        painter.drawText(box.adjusted(22, 0, 0, 0), int(Qt.AlignmentFlag.AlignVCenter), curve.label)
+        right -= width + 4
