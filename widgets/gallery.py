@@ -40,6 +40,8 @@ def examples() -> dict[str, Callable[[], QWidget]]:
 
 def take_shots(app: QApplication, names: Iterable[str], folder: Path, themes: Iterable[str]) -> Iterator[Path]:
     """Write a picture of each example in each theme, and yield the files."""
+    from PySide6.QtCore import QCoreApplication, QEvent
+
     from widgets import theme
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -56,6 +58,8 @@ def take_shots(app: QApplication, names: Iterable[str], folder: Path, themes: It
                 raise OSError(f"{path} cannot be written")
             widget.close()
             widget.deleteLater()
+            # Gone before the next one comes, which a nested event loop would not do.
+            QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
             yield path
 
 

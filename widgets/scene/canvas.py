@@ -76,11 +76,13 @@ class Canvas:
             total += self.render(camera, width, height, (x, y))
         return average(total, len(JITTER))
 
-    def release(self) -> None:
-        """Give the graphics memory back; nothing can be drawn afterwards."""
-        self.renderer.RemoveAllViewProps()
-        self._window.RemoveRenderer(self.renderer)
-        self._window.Finalize()
+    def retire(self, things: object) -> None:
+        """Draw no more. What the canvas and ``things``, which it drew, hold of graphics memory is kept to the end.
+
+        VTK frees a marker mapper's buffers by their numbers in whatever context is current, and so those of another
+        scene, which ends the process as that one draws next. A window needs one scene, so little is kept.
+        """
+        _retired.append((self, things))
 
     def _aim(self, camera: Camera, width: int, height: int, shift: tuple[float, float]) -> None:
         eye: Any = self.renderer.GetActiveCamera()
@@ -99,3 +101,6 @@ class Canvas:
 def average(total: np.ndarray, count: int) -> np.ndarray:
     """The mean (..., 4) uint8 of ``count`` pictures from their sum, uint16."""
     return ((total + count // 2) // count).astype(np.uint8)
+
+
+_retired: list[tuple[Canvas, object]] = []

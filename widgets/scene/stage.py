@@ -154,9 +154,9 @@ class Stage:
             yield None if k + 1 < len(JITTER) else average(total, len(JITTER))
 
     def release(self) -> None:
-        """Give the graphics memory back."""
+        """Draw no more."""
         if self._canvas is not None:
-            self._canvas.release()
+            self._canvas.retire(self._layers)
             self._canvas, self.problem = None, "The 3D view is closed."
 
     def _prepared(self, camera: Camera, size: tuple[int, int], ratio: float) -> tuple[Canvas, int, int]:
