@@ -21,6 +21,7 @@ from solver.pipeline.settings import UNSET, overlay, to_table, without
 
 DECISIONS = {
     "markers": ("start", "stop"),
+    "clean": ("keep", "swaps", "joins"),
     "sync": ("offset", "rate_ratio"),
     "segment": ("threshold", "groups", "merges", "splits", "moves", "left_out"),
     "fit": ("candidate",),

@@ -1,7 +1,8 @@
 """Decisions that stand on something else fall with it, openly: they are taken back by the edit that moved the ground.
 
-The pinned candidate is a row of a ranking, hand-made groups are columns of the marker file. After another ranking, or
-other columns, the same numbers would mean something else, and nobody would see it.
+The pinned candidate is a row of a ranking, hand-made groups are columns of the marker file, edits of tracks are columns
+and frames of it. After another ranking, or of other columns and frames, the same numbers would mean something else, and
+nobody would see it.
 """
 
 from __future__ import annotations
@@ -17,8 +18,7 @@ from solver.pipeline.stage import Source, stage_keys
 from solver.pipeline.stages import SOURCES
 
 _BY_COLUMN = ("merges", "splits", "moves", "left_out")
-_COLUMNS = ("subject",)
-"""Settings of the marker file on which its columns depend."""
+_BY_FRAME = ("keep", "swaps", "joins")
 
 
 def kept_decisions(before: Session, edit: Edit) -> Edit:
@@ -26,17 +26,18 @@ def kept_decisions(before: Session, edit: Edit) -> Edit:
     after, lost = edit.session, []
     if edit.complete:
         return edit
-    if _columns(before) != _columns(after) and (table := after.edits.get("segment")):
-        kept = {name: value for name, value in table.items() if name not in _BY_COLUMN}
-        if kept != table:
-            after = _with(after, "segment", kept)
-            lost.append("groups made by hand are as the cut makes them")
-    pinned = before.edits.get("fit", {}).get("candidate")
-    if (
-        pinned is not None
-        and after.edits.get("fit", {}).get("candidate") == pinned
-        and _ranking(before) != _ranking(after)
+    columns = _columns(before) != _columns(after)
+    for stage, names, moved, said in (
+        ("segment", _BY_COLUMN, columns, "groups made by hand are as the cut makes them"),
+        ("clean", _BY_FRAME, columns or _start(before) != _start(after), "edits of tracks are taken back"),
     ):
+        table = after.edits.get(stage, {})
+        kept = {name: value for name, value in table.items() if name not in names}
+        if moved and kept != table:
+            after = _with(after, stage, kept)
+            lost.append(said)
+    pinned, still = (session.edits.get("fit", {}).get("candidate") for session in (before, after))
+    if pinned is not None and still == pinned and _ranking(before) != _ranking(after):
         after = _with(after, "fit", {name: v for name, v in after.edits["fit"].items() if name != "candidate"})
         lost.append(f"candidate {pinned + 1} is no longer pinned")
     if not lost:
@@ -46,8 +47,12 @@ def kept_decisions(before: Session, edit: Edit) -> Edit:
 
 def _columns(session: Session) -> tuple[Any, ...]:
     file = session.inputs.get("marker_file")
-    table: Mapping[str, Any] = session.settings.get("markers", {})
-    return (None if file is None else file.path, *(table.get(name) for name in _COLUMNS))
+    return None if file is None else file.path, session.settings.get("markers", {}).get("subject")
+
+
+def _start(session: Session) -> Any:
+    """From where frames are counted."""
+    return session.stage_settings(graph_of(session))["markers"].start
 
 
 def _ranking(session: Session) -> str | None:

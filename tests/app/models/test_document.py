@@ -178,6 +178,15 @@ def test_groups_by_hand_fall_with_their_columns(saved: Document, tmp_path: Path)
     assert "as the cut makes them" in str(saved.history.undo_sentence)
 
 
+def test_edits_of_tracks_fall_with_the_frame_they_are_counted_from(saved: Document) -> None:
+    saved.apply(edits.Edit("exchanged", edits.decide(saved.session, "clean", {"swaps": [[0, 1, 30]]})))
+    saved.apply(edits.set_range(saved.session, None, 5.0))
+    assert saved.session.edits["clean"] == {"swaps": [[0, 1, 30]]}, "frames are counted from where they were"
+    saved.apply(replace(edits.set_range(saved.session, 1.0, 5.0), merge=""))
+    assert "clean" not in saved.session.edits
+    assert str(saved.history.undo_sentence).endswith("edits of tracks are taken back")
+
+
 def test_saving_and_opening_brings_back_everything(saved: Document, home: Home) -> None:
     offset(saved, 0.4)
     saved.set_view(camera={"eye": [1.0, 2.0, 3.0]}, frame=17)

@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import settings as tried
 from hypothesis import strategies as st
 
-from app.models import edits, group_edits
+from app.models import clean_edits, edits, group_edits
+from solver.clean.swaps import Proposal
 from solver.errors import InputError
 from solver.markers import Markers
 from solver.pipeline.methods import graph_of
@@ -206,3 +207,15 @@ def test_hand_edits_survive_the_session_file(found: Segmentation, tmp_path: Path
     again = load_session(tmp_path)
     assert again.stage_settings(graph_of(again)) == session.stage_settings(graph_of(session))
     assert again.edits == session.edits
+
+
+def test_proposed_edits_of_tracks_are_made_once() -> None:
+    swap = Proposal("swap", 30, 99, (2, 5), 0.1, "c and f exchange from frame 30 on.")
+    join = Proposal("join", 10, 20, (1, 7), 0.1, "h goes on as b.")
+    session = clean_edits.accept(EMPTY, swap).session
+    session = clean_edits.accept(session, join).session
+    session = clean_edits.keep_samples(session, 3, 4, 8, LABELS).session
+    assert clean_edits.accept(session, swap).session == session
+    assert clean_edits.accept(session, swap).sentence == "c and f exchange from frame 30 on"
+    found = stage(session, "clean")
+    assert (found.swaps, found.joins, found.keep) == (((2, 5, 30),), ((1, 7, 10, 20),), ((3, 4, 8),))

@@ -96,6 +96,6 @@ def test_stages_with_results_are_what_is_in_them(session: Session) -> None:
     results = Results(session.store)
     assert len(results.of(keys_of(session))) == len(keys_of(session))
     other = replace(session, edits={**session.edits, "segment": {"threshold": 0.5}})
-    assert set(results.of(keys_of(other))) == {"markers", "landmarks", "prior", "sync"}
+    assert set(results.of(keys_of(other))) == {"markers", "clean", "landmarks", "prior", "sync"}
     shutil.rmtree(session.store.root / "sync")
     assert "sync" not in results.of(keys_of(session))

@@ -42,7 +42,7 @@ def stale(board: StageBoard) -> set[str]:
 
 def test_a_solved_session_is_cached_throughout(board: StageBoard) -> None:
     assert set(states_of(board).values()) == {"cached"}
-    assert board.names[:3] == ("markers", "landmarks", "prior")
+    assert board.names[:4] == ("markers", "clean", "landmarks", "prior")
     assert board.names[-3:] == ("fit", "angles", "surface")
     card = board.card("fit")
     assert "frames, markers" in card.headline
@@ -77,7 +77,7 @@ def test_an_input_that_changed_makes_stale_what_stands_on_it(
     assert stale(board) == set(), "the same content under another name"
     copy.write_bytes(copy.read_bytes() + b"\0")
     board.refresh()
-    assert stale(board) == {"markers", "segment", "sync"} | FITTED
+    assert stale(board) == {"markers", "clean", "segment", "sync"} | FITTED
     assert board.card("markers").earlier[0].settings == "other files"
 
 

@@ -1,0 +1,28 @@
+"""Hand edits of tracks: proposals of the cleaning made true, samples kept that it would cut."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from app.models.edits import Edit, decide
+from solver.clean.swaps import Proposal
+from solver.pipeline.methods import graph_of
+from solver.pipeline.session import Session
+
+
+def accept(session: Session, proposal: Proposal) -> Edit:
+    """Make an edit of tracks that the cleaning proposes."""
+    frames = (proposal.frame,) if proposal.kind == "swap" else (proposal.frame, proposal.last)
+    row = tuple(int(number) for number in (*proposal.markers, *frames))
+    return Edit(proposal.sentence.rstrip("."), _add(session, "swaps" if proposal.kind == "swap" else "joins", row))
+
+
+def keep_samples(session: Session, marker: int, first: int, last: int, labels: Sequence[str]) -> Edit:
+    """Keep a marker's samples from one frame to another, both included, whatever they look like."""
+    after = _add(session, "keep", (int(marker), int(first), int(last)))
+    return Edit(f"{labels[marker]} kept as measured in frames {first} to {last}", after)
+
+
+def _add(session: Session, name: str, row: tuple[int, ...]) -> Session:
+    rows = getattr(session.stage_settings(graph_of(session))["clean"], name)
+    return decide(session, "clean", {name: [list(known) for known in dict.fromkeys((*rows, row))]})
