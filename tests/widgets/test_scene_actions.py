@@ -198,3 +198,15 @@ def test_no_reference_to_none_is_lost(scene: Scene3D, qapp: QApplication) -> Non
             qapp.processEvents()
         counts.append(sys.getrefcount(None))
     assert abs(counts[1] - counts[0]) < 75, f"{counts[1] - counts[0]} references to None in 150 frames"
+
+
+def test_scenes_that_were_closed_harm_none_that_follow(tmp_path: Path) -> None:
+    """A marker mapper that VTK frees takes the buffers of the scene that draws, and the process ends: so in a child."""
+    root = Path(__file__).parents[2]
+    names = ["scene_clusters", "scene_ghosts", "scene_residuals"]
+    command = [sys.executable, "-m", "widgets.gallery", "--shots", str(tmp_path), "--theme", "dark", *names]
+    run = subprocess.run(command, cwd=root, env={**os.environ}, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    for name in names:
+        drawn = to_rgb(QImage(str(tmp_path / f"{name}_dark_1x.png")))
+        assert drawn.shape == (700, 900, 3) and len(np.unique(drawn.reshape(-1, 3), axis=0)) > 1000
