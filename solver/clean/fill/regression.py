@@ -165,8 +165,8 @@ def _predicted(scene: _Scene, local: _Local, marker: int, gaps: list[Gap]) -> Pa
 
 def _beyond(features: np.ndarray, inverse: np.ndarray, gram: np.ndarray) -> float:
     """How many times surer the frames are that were learnt from: rises where the neighbours are in new places."""
-    usual = float(np.einsum("ij,ji->", inverse, gram))
-    leverage = np.einsum("ni,ij,nj->n", features, inverse, features, optimize=True)
+    usual = float((inverse * gram).sum())  # both are symmetric
+    leverage = ((features @ inverse) * features).sum(axis=1)
     return float(np.sqrt(max(1.0, leverage.mean() / max(usual, 1e-12))))
 
 
