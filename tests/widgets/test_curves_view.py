@@ -13,7 +13,8 @@ from PySide6.QtWidgets import QApplication, QLabel
 from tests.widgets.drawn import distance, pixels
 from widgets import palette, theme
 from widgets.gallery_panels import hypotheses
-from widgets.panels.hypotheses import EnergyBar, HypothesesView
+from widgets.panels.energy_bars import EnergyBar
+from widgets.panels.hypotheses import HypothesesView
 from widgets.panels.transport import Readout, Transport
 from widgets.plots.angle_data import AngleCurve, AnglePlot
 from widgets.plots.convergence import ConvergenceView, EnergyCurve

@@ -22,7 +22,7 @@ from widgets.dialogs.import_dialog import ImportDialog
 from widgets.dialogs.points_preview import PointsPreview
 from widgets.dialogs.shortcut_sheet import ShortcutSheet
 from widgets.gallery_dialogs import ENTRIES, FORMATS
-from widgets.panels.fields import ChoiceBox
+from widgets.panels.controls import ChoiceBox
 from widgets.panels.history import HistoryList
 from widgets.panels.message_bar import Message, MessageBar
 from widgets.panels.progress_strip import ProgressStrip

@@ -13,7 +13,8 @@ from PySide6.QtWidgets import QApplication, QCheckBox, QLabel, QPushButton, QWid
 from tests.widgets.drawn import distance, pixels
 from widgets import theme
 from widgets.gallery_panels import SEGMENT, STAGES
-from widgets.panels.fields import ChoiceBox, CountBox, NumberBox, SettingsForm
+from widgets.panels.controls import ChoiceBox, CountBox, NumberBox
+from widgets.panels.fields import SettingsForm
 from widgets.panels.stage_data import StageProgress, duration, left
 from widgets.panels.stage_panel import StagePanel
 

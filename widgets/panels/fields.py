@@ -2,67 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QFont, QWheelEvent
+from PySide6.QtCore import QSignalBlocker, Signal
+from PySide6.QtGui import QFont
 from PySide6.QtWidgets import (
-    QAbstractSpinBox,
     QCheckBox,
-    QComboBox,
-    QDoubleSpinBox,
     QGridLayout,
     QHBoxLayout,
     QLabel,
-    QLineEdit,
     QSizePolicy,
-    QSpinBox,
     QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
 from widgets.icons import icon
+from widgets.panels.controls import (
+    CountBox,
+    NumberBox,
+    control_of,
+    number_box,
+    on_change,
+    read,
+    said,
+    suffix,
+    write,
+)
 from widgets.panels.stage_data import FieldSpec
-
-_UNITS = {"deg": "°"}
-
-
-class _CalmWheel:
-    """Numbers do not change as the panel is scrolled over them."""
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Leave the wheel to the panel unless the number is being edited."""
-        if self.hasFocus():  # type: ignore[attr-defined]
-            super().wheelEvent(event)  # type: ignore[misc]
-        else:
-            event.ignore()
-
-
-class NumberBox(_CalmWheel, QDoubleSpinBox):
-    """A number without needless zeros, or a blank."""
-
-    blank = False
-
-    def textFromValue(self, value: float) -> str:
-        """Six digits at most."""
-        return "" if self.blank else f"{value:.6g}"
-
-
-class CountBox(_CalmWheel, QSpinBox):
-    """A whole number, or a blank."""
-
-    blank = False
-
-    def textFromValue(self, value: int) -> str:
-        """Without separators."""
-        return "" if self.blank else str(value)
-
-
-class ChoiceBox(_CalmWheel, QComboBox):
-    """One of several words."""
 
 
 class Editor(QWidget):
@@ -83,9 +52,9 @@ class Editor(QWidget):
         self._controls: list[QWidget] = []
         self.automatic: QCheckBox | None = None
         if spec.kind == "range":
-            self._controls = [_number(spec, end) for end in ("from", "to")]
+            self._controls = [number_box(spec, end) for end in ("from", "to")]
         else:
-            self._controls = [_control(spec)]
+            self._controls = [control_of(spec)]
         if spec.optional and spec.kind != "range":
             self.automatic = QCheckBox("auto")
             self.automatic.setToolTip("Leave it to the program")
@@ -97,7 +66,7 @@ class Editor(QWidget):
         layout.addLayout(column, 1)
         for control in self._controls:
             column.addWidget(control)
-            _on_change(control, self._tell)
+            on_change(control, self._tell)
         self.setFocusProxy(self._controls[0])
         self.set_value(spec.value)
 
@@ -105,7 +74,7 @@ class Editor(QWidget):
         """What is set."""
         if self.automatic is not None and self.automatic.isChecked():
             return None
-        values = [_read(control) for control in self._controls]
+        values = [read(control) for control in self._controls]
         return tuple(values) if self.spec.kind == "range" else values[0]
 
     def set_value(self, value: Any) -> None:
@@ -119,7 +88,7 @@ class Editor(QWidget):
                 if part is None and self.spec.kind == "range":
                     control.setValue(control.minimum())  # type: ignore[attr-defined]
                 elif part is not None:
-                    _write(control, part)
+                    write(control, part)
         self._grey()
 
     def _tell(self, *_: object) -> None:
@@ -134,7 +103,7 @@ class Editor(QWidget):
             if isinstance(control, NumberBox | CountBox):
                 control.blank = automatic
                 with QSignalBlocker(control):
-                    control.setSuffix("" if automatic else _suffix(self.spec))
+                    control.setSuffix("" if automatic else suffix(self.spec))
 
 
 class SettingsForm(QWidget):
@@ -215,108 +184,14 @@ class SettingsForm(QWidget):
         self.changed.emit(name, spec.default)
 
 
-def said(spec: FieldSpec, value: Any) -> str:
-    """A value in words."""
-    if value is None:
-        return "automatic"
-    if isinstance(value, bool):
-        return "on" if value else "off"
-    if isinstance(value, tuple | list):
-        return " to ".join("open" if v is None else f"{v:g}" for v in value) + (f" {spec.unit}" if spec.unit else "")
-    number = isinstance(value, int | float)
-    return f"{value:g}{_suffix(spec)}" if number else str(value)
-
-
-def _suffix(spec: FieldSpec) -> str:
-    return (_UNITS.get(spec.unit) or f" {spec.unit}") if spec.unit else ""
-
-
 def _shape(spec: FieldSpec) -> tuple:
     return (spec.name, spec.label, spec.kind, spec.unit, spec.minimum, spec.maximum, spec.choices, spec.optional)
 
 
 def _tip(spec: FieldSpec) -> str:
     ends = [f"{end:g}" if end is not None else "" for end in (spec.minimum, spec.maximum)]
-    span = f" Range: {ends[0]} to {ends[1]}{_suffix(spec)}." if all(ends) and spec.kind in ("float", "int") else ""
+    span = f" Range: {ends[0]} to {ends[1]}{suffix(spec)}." if all(ends) and spec.kind in ("float", "int") else ""
     text = spec.help[:1].upper() + spec.help[1:]
     text = text if not text or text.endswith(".") else text + "."
     hand = " Decided by hand." if spec.decided else ""
     return f"{text} Default: {said(spec, spec.default)}.{span}{hand}".strip()
-
-
-def _control(spec: FieldSpec) -> QWidget:
-    if spec.kind == "float":
-        return _number(spec)
-    if spec.kind == "int":
-        count = CountBox()
-        count.setRange(
-            int(spec.minimum) if spec.minimum is not None else -(2**31),
-            int(spec.maximum) if spec.maximum is not None else 2**31 - 1,
-        )
-        return _typed(count, spec)
-    if spec.kind == "bool":
-        box = QCheckBox()
-        box.setAccessibleName(spec.label)
-        return box
-    if spec.kind == "choice":
-        choice = ChoiceBox()
-        choice.addItems(list(spec.choices))
-        choice.setAccessibleName(spec.label)
-        choice.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        choice.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-        choice.setMinimumContentsLength(6)
-        return choice
-    line = QLineEdit()
-    line.setAccessibleName(spec.label)
-    return line
-
-
-def _number(spec: FieldSpec, end: str = "") -> NumberBox:
-    box = NumberBox()
-    box.setDecimals(9)
-    box.setRange(spec.minimum if spec.minimum is not None else -1e9, spec.maximum if spec.maximum is not None else 1e9)
-    box.setStepType(QAbstractSpinBox.StepType.AdaptiveDecimalStepType)
-    typed = _typed(box, spec)
-    if end:
-        typed.setPrefix(f"{end} ")
-        typed.setAccessibleName(f"{spec.label}, {end}")
-    return typed
-
-
-def _typed(box: Any, spec: FieldSpec) -> Any:
-    box.setSuffix(_suffix(spec))
-    box.setKeyboardTracking(False)
-    box.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-    box.setAccessibleName(spec.label)
-    box.setMinimumWidth(box.fontMetrics().horizontalAdvance(f"from 000.00{_suffix(spec)}") + 24)
-    return box
-
-
-def _on_change(control: Any, tell: Callable[..., None]) -> None:
-    if isinstance(control, QComboBox):
-        control.currentTextChanged.connect(tell)
-    elif isinstance(control, QCheckBox):
-        control.toggled.connect(tell)
-    elif isinstance(control, QLineEdit):
-        control.editingFinished.connect(tell)
-    else:
-        control.valueChanged.connect(tell)
-
-
-def _read(control: Any) -> Any:
-    if isinstance(control, QComboBox):
-        return control.currentText()
-    if isinstance(control, QCheckBox):
-        return control.isChecked()
-    return control.text() if isinstance(control, QLineEdit) else control.value()
-
-
-def _write(control: Any, value: Any) -> None:
-    if isinstance(control, QComboBox):
-        control.setCurrentText(str(value))
-    elif isinstance(control, QCheckBox):
-        control.setChecked(bool(value))
-    elif isinstance(control, QLineEdit):
-        control.setText(str(value))
-    else:
-        control.setValue(value)

@@ -147,7 +147,7 @@ class MessageBar(QWidget):
             self._drop(row)
         row = MessageRow(message)
         row.closed.connect(self._close)
-        row.action_wanted.connect(lambda row: self.action_wanted.emit(row.message))
+        row.action_wanted.connect(self._act)  # no lambda: it would hold the bar, and let go of it inside a deletion
         self._rows.insert(0, row)
         self._layout.insertWidget(0, row)
         while len(self._rows) > _MOST:
@@ -167,6 +167,9 @@ class MessageBar(QWidget):
     def rows(self) -> list[MessageRow]:
         """The rows, top down."""
         return list(self._rows)
+
+    def _act(self, row: MessageRow) -> None:
+        self.action_wanted.emit(row.message)
 
     def _close(self, row: MessageRow) -> None:
         self._drop(row)
