@@ -17,7 +17,7 @@ from solver.clean.gaps import Fill, Filled, FillSettings, Gap, gaps_to_fill, tog
 _FEWEST_FRAMES = 30
 """Frames that a regression needs; with fewer the rigid body is surer."""
 _MOST_FRAMES = 500
-_ROUNDS = 2
+_ROUNDS = 3
 """Gaps are filled from neighbours that have gaps themselves: each round starts from the last one's filling."""
 _NOISE_M = 0.0015
 """Noise of a neighbour that is seen: the ridge."""
