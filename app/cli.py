@@ -43,6 +43,9 @@ COMMANDS = {
 }
 
 
+_HELP = "markerscope --help"
+
+
 def main(arguments: Sequence[str] | None = None, services: Services = SERVICES) -> int:
     """Run one command; returns its exit code."""
     for stream in (sys.stdout, sys.stderr):
@@ -62,7 +65,7 @@ def main(arguments: Sequence[str] | None = None, services: Services = SERVICES) 
 
 def _run(words: list[str], services: Services) -> int:
     if not words or (words[0] not in COMMANDS and not words[0].startswith("-")):
-        return _no_window(words)
+        return _open(words, services)
     try:
         options = _parser().parse_args(words)
     except SystemExit as error:  # --help, or a wrong word that has been told
@@ -196,12 +199,17 @@ def _attach_negative_values(words: list[str]) -> list[str]:
     return joined
 
 
-def _no_window(words: Sequence[str]) -> int:
-    """Say what there is instead of the window."""
-    names = ", ".join(COMMANDS)
-    if words and not Path(words[0]).exists():
-        problem = f'"{words[0]}" is neither a command nor a file'
-    else:
-        problem = "this version has no window yet"
-    print(f"markerscope: {problem}; the commands are {names} (markerscope solve --help).", file=sys.stderr)
-    return REFUSED
+def _open(words: Sequence[str], services: Services) -> int:
+    """Open the window: empty, or on the session or marker file that is named."""
+    path = Path(words[0]) if words else None
+    if path is not None and not path.exists():
+        names = ", ".join(COMMANDS)
+        print(
+            f'markerscope: "{path}" is neither a command nor a file; the commands are {names} ({_HELP}).',
+            file=sys.stderr,
+        )
+        return REFUSED
+    if len(words) > 1:
+        print(f"markerscope: one session or marker file at a time; see {_HELP}.", file=sys.stderr)
+        return REFUSED
+    return services.window(path, False)

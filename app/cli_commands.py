@@ -65,6 +65,18 @@ def _clean(request: CleanRequest, progress: Progress) -> Outcome:
     return clean_file(request, progress)
 
 
+def _no_window() -> str:
+    from app.window.start import display_problem
+
+    return display_problem()
+
+
+def _window(path: Path | None, example: bool) -> int:
+    from app.window.start import open_window
+
+    return open_window(path, example)
+
+
 @dataclass(frozen=True)
 class Services:
     """The solver's functions that the commands call, loaded when they are needed."""
@@ -76,6 +88,8 @@ class Services:
     synth: Callable[[SynthRequest, Progress], Outcome] = _synth
     dataset: Callable[[DatasetRequest, Progress], Outcome] = _dataset
     clean: Callable[[CleanRequest, Progress], Outcome] = _clean
+    no_window: Callable[[], str] = _no_window
+    window: Callable[[Path | None, bool], int] = _window
 
 
 SERVICES = Services()
@@ -90,7 +104,9 @@ def run_solve(options: argparse.Namespace, services: Services) -> int:
 
 
 def run_demo(options: argparse.Namespace, services: Services) -> int:
-    """``markerscope demo``: the embedded session, then its result against the truth."""
+    """``markerscope demo``: the embedded session in the window; headless, its result against the truth."""
+    if not (options.headless or options.json or options.quiet) and not services.no_window():
+        return services.window(None, True)
     with Terminal(options) as terminal:
         request = SolveRequest(markers=DEMO_MARKERS, video=DEMO_VIDEO, out=options.out)
         solved = _solve_into(request, services, terminal.progress)

@@ -36,6 +36,8 @@ class Fake:
         self.evaluations: list[EvaluateRequest] = []
         self.demos: list[Path] = []
         self.fails = fails
+        self.windows: list[tuple[Path | None, bool]] = []
+        self.display = ""
 
     def solve(self, request: SolveRequest, progress: Progress) -> SolveOutcome:
         self.solves.append(request)
@@ -57,7 +59,11 @@ class Fake:
 
     @property
     def services(self) -> Services:
-        return Services(self.solve, self.evaluate, self.judge_demo)
+        return Services(self.solve, self.evaluate, self.judge_demo, no_window=lambda: self.display, window=self.window)
+
+    def window(self, path: Path | None, example: bool) -> int:
+        self.windows.append((path, example))
+        return 0
 
 
 @pytest.fixture
@@ -158,6 +164,30 @@ def test_evaluate_compares(markers: Path, tmp_path: Path, capsys) -> None:
     assert capsys.readouterr().out == "MPJPE 12.0 mm.\n"
 
 
+def test_without_a_command_the_window_opens(markers: Path, tmp_path: Path) -> None:
+    fake = Fake()
+    for words, asked in (([], (None, False)), ([str(markers)], (markers, False)), (["demo"], (None, True))):
+        assert main(words, fake.services) == 0
+        assert fake.windows.pop() == asked
+    assert not fake.solves and not fake.windows
+
+
+def test_demo_stays_in_the_terminal_where_there_is_no_display(tmp_path: Path) -> None:
+    fake = Fake()
+    fake.display = "there is no display"
+    assert main(["demo", "--out", str(tmp_path / "out")], fake.services) == 0
+    assert fake.demos == [tmp_path / "out"] and not fake.windows
+
+
+def test_a_window_without_a_display_is_one_sentence(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("app.window.start.sys.platform", "linux")
+    assert main([]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "there is no display" in said and "demo --headless" in said
+
+
 def test_a_session_is_solved_into_its_own_folder(tmp_path: Path) -> None:
     (tmp_path / "session.toml").write_text("schema = 1\n")
     fake = Fake()
@@ -168,9 +198,8 @@ def test_a_session_is_solved_into_its_own_folder(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("", "no window yet; the commands are demo, solve, evaluate"),
         ("slove MARKERS", '"slove" is neither a command nor a file'),
-        ("MARKERS", "no window yet"),
+        ("MARKERS MARKERS", "one session or marker file at a time"),
         ("solve", "arguments are required: MARKERS|SESSION"),
         ("solve MARKERS", "no folder for the results was named; add --out DIR."),
         ("solve absent.trc --out OUT", "absent.trc: there is no such file; check the name"),

@@ -1,0 +1,134 @@
+"""The table of candidates: filling while they are searched, each with its ghost, one to go on from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.models import edits
+from app.models.workbench import Workbench
+from app.views.candidates import CandidateTable as Table
+from app.views.candidates import candidate_table, covered_by
+from app.views.running import candidates_so_far
+from app.window.ghosts import Ghosts
+from app.window.shown import Shown
+from solver.progress import Found
+from solver.solve.results import Localization
+from widgets import palette
+from widgets.tables.candidates import CandidateTable
+
+
+class CandidatesBinder:
+    """Fills the table, and takes the row that is chosen."""
+
+    def __init__(self, widget: CandidateTable, bench: Workbench, shown: Shown, ghosts: Ghosts) -> None:
+        self.widget, self.bench, self.shown, self.ghosts = widget, bench, shown, ghosts
+        self._table: Table | None = None
+        self._step = ""
+        self._choosing = False
+        shown.changed.connect(self._changed)
+        bench.document.changed.connect(lambda another: self.fill())
+        bench.runner.found.connect(self._found)
+        bench.runner.changed.connect(self.fill)
+        bench.selection.changed.connect(lambda what: self._select())
+        widget.row_selected.connect(self._chosen)
+        widget.row_activated.connect(self._chosen)
+        widget.pin_requested.connect(self._pin)
+        widget.step_chosen.connect(self._to_step)
+
+    def fill(self) -> None:
+        """Show what is known."""
+        self._table = self._so_far() or self._result()
+        if self._table is None:
+            self.widget.set_steps([])
+            self.widget.set_rows([])
+            return
+        table = self._table
+        names = [step.name for step in table.steps]
+        if self._step not in names:
+            self._step = names[-1] if names else ""
+        pinned = self._pinned()
+        rows = table.rows
+        place = next((i for i, row in enumerate(rows) if row.candidate == pinned), -1) if pinned is not None else -1
+        inks = palette.categorical(12)
+        colours = np.stack([inks[max(row.candidate, row.pool, 0) % 12] for row in rows]) if rows else None
+        self.widget.set_rows(rows, place, table.score, table.unit, colours)
+        self.widget.set_steps(table.steps, self._step)
+        self._select()
+
+    def _pinned(self) -> int | None:
+        if not self.bench.document.is_open:
+            return None
+        return getattr(self.bench.board.settings.get("fit"), "candidate", None)
+
+    def _so_far(self) -> Table | None:
+        if not self.bench.runner.running:
+            return None
+        notes = [note for found in self.bench.runner.notes.values() for note in found]
+        found = self.shown.get("localize")
+        return candidates_so_far(notes, found if isinstance(found, Localization) else None)
+
+    def _result(self) -> Table | None:
+        found, ranked = self.shown.get("localize"), self.shown.get("orient")
+        if found is None:
+            return None
+        in_use = None
+        if ranked is not None:
+            pinned = self._pinned()
+            in_use = 0 if pinned is None else pinned
+        covered = {} if ranked is None else self.shown.once("covered", (ranked, found), lambda: self._covered())
+        return candidate_table(found, ranked, in_use, covered)
+
+    def _covered(self) -> dict[int, float]:
+        ranked, markers = self.shown.get("orient"), self.shown.markers
+        covered: dict[int, float] = {}
+        for row in range(len(ranked.candidates)):
+            track = self.ghosts.candidate_track(row)
+            if track is not None and markers is not None:
+                covered[row] = covered_by(track, markers)
+        return covered
+
+    def _changed(self, stages: frozenset[str]) -> None:
+        if stages & {"localize", "orient", "fit", "markers", "clean"}:
+            self.fill()
+
+    def _found(self, found: Found) -> None:
+        if found.kind in ("candidate", "chain"):
+            self.fill()
+
+    def _to_step(self, name: str) -> None:
+        self._step = name
+
+    def _chosen(self, row: int) -> None:
+        if self._table is None or not 0 <= row < len(self._table.rows):
+            return
+        own = self._table.rows[row]
+        self._choosing = True
+        try:
+            self.bench.selection.select(
+                candidate=own.candidate if own.candidate >= 0 else None,
+                hypothesis=own.pool if own.candidate < 0 and own.pool >= 0 else None,
+            )
+        finally:
+            self._choosing = False
+
+    def _select(self) -> None:
+        if self._table is None or self._choosing:
+            return
+        chosen, pool = self.bench.selection.candidate, self.bench.selection.hypothesis
+        rows = self._table.rows
+        place = -1
+        if chosen is not None:
+            place = next((i for i, row in enumerate(rows) if row.candidate == chosen), -1)
+        elif pool is not None:
+            place = next((i for i, row in enumerate(rows) if row.pool == pool), -1)
+        self.widget.set_selected(place)
+
+    def _pin(self, row: int) -> None:
+        if self._table is None or not 0 <= row < len(self._table.rows):
+            return
+        own = self._table.rows[row]
+        document = self.bench.document
+        if own.candidate == self._pinned():
+            self.bench.attempt(lambda: document.apply(edits.unpin_candidate(document.session)))
+        else:
+            self.bench.attempt(lambda: document.apply(edits.pin_candidate(document.session, own.candidate)))

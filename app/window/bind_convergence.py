@@ -1,0 +1,55 @@
+"""How the energies fell, and the body at any iteration that was kept."""
+
+from __future__ import annotations
+
+from app.models.workbench import Workbench
+from app.views.convergence import EnergyCurve, of_orientation, of_paper
+from app.views.running import curves_so_far
+from app.window.ghosts import Ghosts
+from app.window.shown import Shown
+from solver.progress import Found
+from widgets.plots.convergence import ConvergenceView
+
+
+class ConvergenceBinder:
+    """Fills the curves, and has the body follow the slider."""
+
+    def __init__(self, widget: ConvergenceView, bench: Workbench, shown: Shown, ghosts: Ghosts) -> None:
+        self.widget, self.bench, self.shown, self.ghosts = widget, bench, shown, ghosts
+        self.curves: tuple[EnergyCurve, ...] = ()
+        shown.changed.connect(self._changed)
+        bench.runner.found.connect(self._found)
+        bench.runner.changed.connect(self.fill)
+        widget.iteration_chosen.connect(self._chosen)
+
+    def fill(self) -> None:
+        """Show the descents that there are."""
+        so_far: tuple[EnergyCurve, ...] = ()
+        if self.bench.runner.running:
+            so_far = curves_so_far([note for notes in self.bench.runner.notes.values() for note in notes])
+        curves = so_far or self._results()
+        if len(curves) != len(self.curves) or any(a is not b for a, b in zip(curves, self.curves)):
+            self.curves = curves
+            self.widget.set_curves(curves)
+
+    def _results(self) -> tuple[EnergyCurve, ...]:
+        found, ranked, solved = (self.shown.get(name) for name in ("localize", "orient", "solve"))
+        from solver.solve.paper.results import PaperLocalization
+
+        if isinstance(found, PaperLocalization):
+            return self.shown.once("curves", (found, solved, ranked), lambda: of_paper(found, solved, ranked))
+        return () if ranked is None else self.shown.once("curves", (ranked,), lambda: of_orientation(ranked))
+
+    def _changed(self, stages: frozenset[str]) -> None:
+        if stages & {"localize", "orient", "solve"}:
+            self.fill()
+
+    def _found(self, found: Found) -> None:
+        if found.kind == "iteration" and self.widget.isVisible():
+            self.fill()
+
+    def _chosen(self, curve: int, iteration: int) -> None:
+        if 0 <= curve < len(self.curves):
+            own = self.curves[curve]
+            self.bench.selection.select(iteration=iteration)
+            self.ghosts.show_iteration(own, own.step(iteration))

@@ -1,0 +1,109 @@
+"""The answers side by side: each with a picture of its body in the markers."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QTimer
+from PySide6.QtGui import QImage
+
+from app.models import edits
+from app.models.workbench import Workbench
+from app.views.hypotheses import HypothesesPicture, hypotheses_picture
+from app.views.posing import BONE_EDGES
+from app.window.ghosts import Ghosts
+from app.window.shown import Shown
+from widgets import palette
+from widgets.panels.hypotheses import HypothesesView
+from widgets.scene import Scene3D
+
+_SIZE = 320, 240
+
+
+class HypothesesBinder:
+    """Fills the cards. The pictures are drawn one by one in a scene of their own, which is kept."""
+
+    def __init__(self, widget: HypothesesView, bench: Workbench, shown: Shown, ghosts: Ghosts) -> None:
+        self.widget, self.bench, self.shown, self.ghosts = widget, bench, shown, ghosts
+        self._scene: Scene3D | None = None
+        self._picture: HypothesesPicture | None = None
+        self._images: dict[int, QImage] = {}
+        self._of: object = None
+        self._timer = QTimer(widget, interval=0)
+        self._timer.timeout.connect(self._draw_next)
+        shown.changed.connect(self._changed)
+        bench.document.changed.connect(lambda another: self.fill())
+        bench.selection.changed.connect(lambda what: self._select())
+        widget.hypothesis_selected.connect(lambda row: bench.selection.select(candidate=row, hypothesis=None))
+        widget.pin_requested.connect(self._pin)
+
+    def fill(self) -> None:
+        """Show the answers that there are."""
+        ranked = self.shown.get("orient")
+        if ranked is None:
+            self._picture, self._of = None, None
+            self.widget.set_cards([])
+            return
+        if ranked is not self._of:
+            self._of, self._images = ranked, {}
+            self._timer.start()
+        fit = self.bench.board.settings.get("fit") if self.bench.document.is_open else None
+        self._picture = hypotheses_picture(ranked, getattr(fit, "candidate", None) or 0, self.shown.get("solve"))
+        self._show()
+
+    def _show(self) -> None:
+        assert self._picture is not None
+        cards = self._picture.cards
+        self.widget.set_cards(cards, [self._images.get(c.candidate) for c in cards], self._picture.sentence)
+        self._select()
+
+    def _changed(self, stages: frozenset[str]) -> None:
+        if stages & {"orient", "solve", "localize", "fit"}:
+            self.fill()
+
+    def _select(self) -> None:
+        row = self.bench.selection.candidate
+        self.widget.set_selected(-1 if row is None else row)
+
+    def _pin(self, row: int) -> None:
+        document = self.bench.document
+        self.bench.attempt(lambda: document.apply(edits.pin_candidate(document.session, row)))
+
+    def _draw_next(self) -> None:
+        """One picture at a time, so that nothing waits for all of them; only while somebody looks."""
+        if not self.widget.isVisible():
+            self._timer.setInterval(500)
+            return
+        self._timer.setInterval(0)
+        cards = self._picture.cards if self._picture is not None else ()
+        waiting = [card.candidate for card in cards if card.candidate not in self._images]
+        if not waiting:
+            self._timer.stop()
+            return
+        self._images[waiting[0]] = self._draw(waiting[0])
+        if len(waiting) == 1:
+            self._show()
+
+    def _draw(self, row: int) -> QImage:
+        track, markers = self.ghosts.candidate_track(row), self.shown.markers
+        if self._scene is None:
+            self._scene = Scene3D()
+            self._scene.resize(*_SIZE)
+            for layer in ("axes", "legend"):
+                self._scene.show_layer(layer, False)
+        scene = self._scene
+        if track is None or markers is None or scene.problem is not None:
+            blank = QImage(*_SIZE, QImage.Format.Format_RGB32)
+            blank.fill(0x888888)
+            return blank
+        time = float(track.times[len(track.times) // 2])
+        frame = int(np.clip(round((time - markers.time[0]) * markers.rate), 0, len(markers.positions) - 1))
+        vertices = track.vertices(time, "coarse")
+        colour = palette.categorical(12)[row % 12]
+        scene.set_mesh("body", vertices, track.faces("coarse"), colour, 0.55)
+        scene.set_bones("skeleton", track.joints(time), BONE_EDGES, colour)
+        points = markers.positions[frame]
+        scene.set_markers(points, np.tile(np.array([[200, 30, 60]], np.uint8), (len(points), 1)))
+        scene.set_floor(0.0)
+        scene.view_from("isometric")
+        scene.frame(vertices)
+        return scene.image(1.0, _SIZE)

@@ -1,0 +1,48 @@
+"""The table of markers."""
+
+from __future__ import annotations
+
+from app.models.workbench import Workbench
+from app.views.colours import by_cluster
+from app.views.markers import marker_table
+from app.window.shown import Shown
+from widgets.tables.markers import MarkerTable
+
+
+class MarkersBinder:
+    """Fills the table, and takes the rows that are selected."""
+
+    def __init__(self, widget: MarkerTable, bench: Workbench, shown: Shown) -> None:
+        self.widget, self.bench, self.shown = widget, bench, shown
+        self._telling = False
+        shown.changed.connect(self._changed)
+        bench.selection.changed.connect(lambda what: self._select())
+        widget.markers_selected.connect(self._selected)
+        widget.worst_requested.connect(self._worst)
+
+    def _changed(self, stages: frozenset[str]) -> None:
+        tracks = self.shown.tracks
+        if tracks is None or not stages & {"markers", "clean", "segment", "fit"}:
+            return
+        segmentation, motion = self.shown.segmentation, self.shown.fit
+        rows = self.shown.once(
+            "marker rows", (tracks, segmentation, motion), lambda: marker_table(tracks, segmentation, motion)
+        )
+        clusters = self.shown.clusters
+        self.widget.set_rows(rows, None if clusters is None else by_cluster(clusters).colours)
+        self._select()
+
+    def _select(self) -> None:
+        if not self._telling:
+            self.widget.set_selected(sorted(self.bench.selection.markers))
+
+    def _selected(self, markers: list[int]) -> None:
+        self._telling = True
+        try:
+            self.bench.selection.select_markers(markers)
+        finally:
+            self._telling = False
+
+    def _worst(self, marker: int, time: float) -> None:
+        self.bench.selection.select_markers([marker])
+        self.bench.clock.seek(time)

@@ -1,0 +1,27 @@
+"""What the models have to say, in the window."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QTimer
+
+from app.models.workbench import Said, Workbench
+from widgets.panels.message_bar import Level, Message, MessageBar
+
+_NOTE_MS = 12_000
+_LEVELS: dict[str, Level] = {"note": "info", "warning": "warning", "error": "error"}
+
+
+class MessagesBinder:
+    """Shows every message; a note goes by itself."""
+
+    def __init__(self, widget: MessageBar, bench: Workbench) -> None:
+        self.widget = widget
+        bench.said.connect(self._say)
+        bench.runner.changed.connect(lambda: widget.clear("run") if bench.runner.running else None)
+
+    def _say(self, said: Said) -> None:
+        key = f"{said.level} {said.sentence}"
+        where = str(said.where)
+        self.widget.show_message(Message(_LEVELS[said.level], said.what, where, said.remedy, key=key))
+        if said.level == "note":
+            QTimer.singleShot(_NOTE_MS, self.widget, lambda: self.widget.clear(key))

@@ -1,0 +1,198 @@
+"""The 3D scene: markers, body and skeleton at the clock's time, coloured and selected as everywhere."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import Qt
+
+from app.models.workbench import Workbench
+from app.views import scene
+from app.views.colours import Legend
+from app.views.posing import BONE_EDGES, Detail
+from app.window.ghosts import Ghosts
+from app.window.keys import how
+from app.window.shown import Shown
+from widgets import palette
+from widgets.scene import ColourBar, Scene3D
+
+_NONE = np.zeros((0, 3))
+
+
+class SceneBinder:
+    """Draws the scene, and takes what is clicked in it for the selection.
+
+    Attributes
+    ----------
+    clusters : (M,) groups while a cut is being dragged, else None
+    """
+
+    def __init__(self, widget: Scene3D, bench: Workbench, shown: Shown, ghosts: Ghosts) -> None:
+        self.widget, self.bench, self.shown, self.ghosts = widget, bench, shown, ghosts
+        self.clusters: np.ndarray | None = None
+        self._framed = False
+        self._legend: Legend | None = None
+        self._ghost_layers: set[str] = set()
+        bench.clock.moved.connect(lambda time: self.draw())
+        bench.clock.changed.connect(self.draw)
+        bench.display.changed.connect(self._display)
+        bench.selection.changed.connect(lambda what: self.draw())
+        bench.opened.connect(self._opened)
+        shown.changed.connect(self._changed)
+        ghosts.changed.connect(self.draw)
+        widget.marker_clicked.connect(lambda marker, held: bench.selection.select_markers([marker], how(held)))
+        widget.markers_boxed.connect(lambda markers, held: bench.selection.select_markers(markers, _box_how(held)))
+        widget.bone_clicked.connect(lambda layer, bone, held: self._bone(bone, held))
+        widget.background_clicked.connect(lambda held: None if _held(held) else bench.selection.clear())
+        self._display(frozenset({"follow"}))
+
+    def drag(self, clusters: np.ndarray | None) -> None:
+        """Show these groups while a cut is dragged; None shows those of the result."""
+        self.clusters = clusters
+        self.draw()
+
+    def draw(self) -> None:
+        """Show the clock's moment."""
+        tracks = self.shown.tracks
+        if tracks is None:
+            self._clear()
+            return
+        bench, display = self.bench, self.bench.display
+        layers, time = display.layers, bench.clock.time
+        frame = tracks.nearest(time)
+        drawn = scene.markers_at(
+            tracks, frame, display.colour_by, segmentation=self.shown.segmentation, clusters=self.clusters,
+            motion=self.shown.fit, selected=bench.selection.markers,
+        )  # fmt: skip
+        widget = self.widget
+        widget.set_markers(drawn.positions if layers["markers"] else drawn.positions * np.nan, drawn.coloured.colours)
+        widget.set_selected(bench.selection.markers)
+        widget.set_trails(scene.trails(tracks, frame, display.trail_s) if layers["trails"] else None)
+        self._say(drawn.coloured.legend)
+        self._draw_body(frame, time)
+        self._draw_ghosts(time)
+        widget.follow_point(scene.middle(tracks, frame))
+
+    def _draw_body(self, frame: int, time: float) -> None:
+        widget, track, display = self.widget, self.shown.track, self.bench.display
+        tracks = self.shown.tracks
+        assert tracks is not None
+        hidden = track is None or self.ghosts.replaces_body
+        detail: Detail = "coarse" if self.bench.clock.playing else "full"
+        if hidden or not display.layers["body"]:
+            widget.set_mesh("body", None, _NONE)
+        else:
+            assert track is not None
+            widget.set_mesh("body", track.vertices(time, detail), track.faces(detail), opacity=display.opacity)
+        joints = None if hidden or not display.layers["skeleton"] else track.joints(time)  # type: ignore[union-attr]
+        widget.set_bones("skeleton", joints, BONE_EDGES, self._bone_colours())
+        if hidden or not display.layers["links"]:
+            widget.set_lines("links", None, None)
+        else:
+            assert track is not None
+            lines = scene.ties(tracks, track, frame)
+            widget.set_lines("links", lines.start, lines.end)
+
+    def _bone_colours(self) -> Any:
+        bone = self.bench.selection.bone
+        if bone is None:
+            return None
+        from widgets import theme
+
+        colours = np.tile(np.array(theme.colours().bone, dtype=np.uint8), (len(BONE_EDGES), 1))
+        colours[BONE_EDGES[:, 0] == bone] = palette.SELECTED
+        return colours
+
+    def _draw_ghosts(self, time: float) -> None:
+        here = {f"ghost {ghost.name}": ghost for ghost in self.ghosts.all} if self._ghosts_on() else {}
+        for name in self._ghost_layers - here.keys():
+            self.widget.set_mesh(name, None, _NONE)
+            self.widget.set_bones(name, None, BONE_EDGES)
+        for name, ghost in here.items():
+            vertices = ghost.track.vertices(time, "coarse")
+            self.widget.set_mesh(name, vertices, ghost.track.faces("coarse"), ghost.colour, ghost.opacity)
+            self.widget.set_bones(name, ghost.track.joints(time), BONE_EDGES, ghost.colour)
+        self._ghost_layers = set(here)
+
+    def _ghosts_on(self) -> bool:
+        return self.bench.display.layers["ghosts"] or self.ghosts.replaces_body
+
+    def _say(self, legend: Legend) -> None:
+        if legend == self._legend:
+            return
+        self._legend = legend
+        scale = legend.scale
+        self.widget.set_legend(
+            legend.title,
+            legend.entries if scale is None else ColourBar(scale.lo, scale.hi, scale.unit, scale.name),
+        )
+
+    def _clear(self) -> None:
+        self.widget.set_markers(_NONE, np.zeros((0, 3), np.uint8))
+        self.widget.set_mesh("body", None, _NONE)
+        self.widget.set_bones("skeleton", None, BONE_EDGES)
+        self.widget.set_lines("links", None, None)
+        self.widget.set_legend("", None)
+        self.widget.set_trails(None)
+        self._legend = None
+        for name in self._ghost_layers:
+            self.widget.set_mesh(name, None, _NONE)
+            self.widget.set_bones(name, None, BONE_EDGES)
+        self._ghost_layers = set()
+
+    def _opened(self) -> None:
+        self._framed = False
+        self.clusters = None
+        if not self.bench.document.is_open:
+            self._clear()
+
+    def _changed(self, stages: frozenset[str]) -> None:
+        if "segment" in stages:
+            self.clusters = None
+        self.draw()
+        tracks = self.shown.tracks
+        if tracks is None:
+            return
+        if stages & {"markers", "clean"}:
+            self._names()
+            lowest, highest = scene.extent(tracks)
+            self.widget.set_floor(0.0 if -0.3 < lowest[2] < 0.5 else float(lowest[2]))
+        track = self.shown.track
+        if "fit" in stages and track is not None:
+            self.widget.set_facing(track.rotations[len(track.times) // 2, 0][:2, 2])
+        if not self._framed:
+            self._framed = True
+            state = self.bench.document.view.get("camera")
+            if isinstance(state, dict):
+                self.widget.restore_camera(state)
+            else:
+                lowest, highest = scene.extent(tracks)
+                self.widget.view_from("isometric")
+                self.widget.frame(np.stack([lowest, highest, [*lowest[:2], highest[2]], [*highest[:2], lowest[2]]]))
+
+    def _display(self, names: frozenset[str]) -> None:
+        display = self.bench.display
+        self.widget.show_layer("floor", display.layers["floor"])
+        self.widget.show_layer("axes", display.layers["floor"])
+        self.widget.set_follow(display.follow)
+        self._names()
+        self.draw()
+
+    def _names(self) -> None:
+        markers = self.shown.markers
+        named = markers is not None and self.bench.display.layers["labels"]
+        self.widget.set_marker_labels(markers.labels if named and markers is not None else None)
+
+    def _bone(self, edge: int, held: Qt.KeyboardModifier) -> None:
+        if 0 <= edge < len(BONE_EDGES):
+            self.bench.selection.select_bone(int(BONE_EDGES[edge, 0]), how(held))
+
+
+def _held(held: Qt.KeyboardModifier) -> bool:
+    return bool(held & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier))
+
+
+def _box_how(held: Qt.KeyboardModifier) -> Any:
+    """Shift draws the box, so it alone replaces; with Ctrl it adds."""
+    return "add" if held & Qt.KeyboardModifier.ControlModifier else "replace"

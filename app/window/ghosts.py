@@ -1,0 +1,124 @@
+"""Other answers than the fit, drawn over it: a candidate, a hypothesis, an iteration, results that are compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from app.models.signal import Signal
+from app.models.workbench import Workbench
+from app.views import bodies
+from app.views.bodies import BodyTrack
+from app.views.convergence import EnergyCurve
+from app.window.shown import Shown
+from solver.solve.results import Localization
+from widgets import palette
+
+
+@dataclass(frozen=True)
+class Ghost:
+    """A body to draw: what it is, its colour and how opaque it is."""
+
+    name: str
+    track: BodyTrack
+    colour: tuple[int, int, int]
+    opacity: float = 0.35
+
+
+class Ghosts:
+    """Which ghosts are to be drawn.
+
+    Attributes
+    ----------
+    all : now
+    replaces_body : whether the first of them stands in for the fitted body
+    changed : emitted when they are others
+    """
+
+    def __init__(self, bench: Workbench, shown: Shown) -> None:
+        self.bench, self.shown = bench, shown
+        self.changed: Signal[[]] = Signal()
+        self.all: tuple[Ghost, ...] = ()
+        self.replaces_body = False
+        self._iteration: tuple[EnergyCurve, int] | None = None
+        shown.changed.connect(self._results)
+        bench.selection.changed.connect(self._selected)
+
+    def show_iteration(self, curve: EnergyCurve | None, step: int = 0) -> None:
+        """Have the body as it was at a row of a descent's trace; None shows the fit again."""
+        self._iteration = None if curve is None or curve.trace is None else (curve, step)
+        self._make()
+
+    def _selected(self, what: object) -> None:
+        names = set(what) if isinstance(what, frozenset | set | tuple | list) else set()
+        if names & {"candidate", "hypothesis"}:
+            self._iteration = None
+            self._make()
+
+    def _results(self, stages: frozenset[str]) -> None:
+        if stages & {"localize", "orient", "solve", "clean", "markers", "compared", "fit", "prior", "sync"}:
+            if stages & {"localize", "orient", "solve"}:
+                self._iteration = None
+            self._make()
+
+    def _make(self) -> None:
+        found = []
+        own = self._of_iteration() if self._iteration is not None else self._of_selection()
+        if own is not None:
+            found.append(own)
+        colours = palette.categorical(8)
+        for k, (ref, motion) in enumerate(self.shown.compared("fit").items()):
+            name = f"compared {ref.key}"
+            track = self.shown.once(name, (motion,), partial(bodies.of_motion, self.shown.body, motion))
+            found.append(Ghost(name, track, _rgb(colours[(k + 1) % 8])))
+        before = [ghost.name for ghost in self.all], [ghost.track for ghost in self.all]
+        self.replaces_body = own is not None and self._iteration is not None
+        self.all = tuple(found)
+        if before != ([ghost.name for ghost in found], [ghost.track for ghost in found]):
+            self.changed.emit()
+
+    def _of_iteration(self) -> Ghost | None:
+        found, markers = self.shown.get("localize"), self.shown.markers
+        assert self._iteration is not None
+        curve, step = self._iteration
+        if found is None or markers is None or curve.trace is None:
+            return None
+        vertex = curve.vertex if curve.vertex is not None else np.zeros(0, dtype=np.intp)
+        track = bodies.of_iteration(self.shown.body, curve.trace, step, found, markers, vertex)
+        return Ghost("iteration", track, curve.colour, 0.75)
+
+    def _of_selection(self) -> Ghost | None:
+        track = self.candidate_track()
+        if track is not None:
+            row = self.bench.selection.candidate
+            return Ghost("candidate", track, _rgb(palette.categorical(12)[(row or 0) % 12]))
+        found, prior, sync = (self.shown.get(name) for name in ("localize", "prior", "sync"))
+        row, markers = self.bench.selection.hypothesis, self.shown.markers
+        if row is None or markers is None or found is None or prior is None or sync is None:
+            return None
+        if isinstance(found, Localization):
+            if row >= len(found.start):
+                return None
+            track = bodies.of_hypothesis(self.shown.body, found, row, prior, sync, markers)
+        else:
+            if row >= len(found.candidates):
+                return None
+            track = bodies.of_chain(self.shown.body, found, row, prior, sync, markers)
+        return Ghost("hypothesis", track, _rgb(palette.categorical(12)[row % 12]))
+
+    def candidate_track(self, row: int | None = None) -> BodyTrack | None:
+        """The body of a candidate, the selected one by default."""
+        ranked, found, markers = self.shown.get("orient"), self.shown.get("localize"), self.shown.markers
+        row = self.bench.selection.candidate if row is None else row
+        if row is None or ranked is None or found is None or markers is None or row >= len(ranked.candidates):
+            return None
+        own = ranked.candidates[row]
+        return self.shown.once(
+            f"candidate {row}", (own, found, markers), lambda: bodies.of_candidate(self.shown.body, own, found, markers)
+        )
+
+
+def _rgb(colour: np.ndarray) -> tuple[int, int, int]:
+    return int(colour[0]), int(colour[1]), int(colour[2])

@@ -1,0 +1,266 @@
+"""The main window: widgets, models and actions put together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+
+from app.actions import ACTIONS, Actions, Asks
+from app.actions.session_actions import may_close, open_path
+from app.models.workbench import Workbench
+from app.window.actions import Menus
+from app.window.asks import WindowAsks
+from app.window.bind_affinity import AffinityBinder
+from app.window.bind_angles import AnglesBinder
+from app.window.bind_candidates import CandidatesBinder
+from app.window.bind_convergence import ConvergenceBinder
+from app.window.bind_history import HistoryBinder
+from app.window.bind_hypotheses import HypothesesBinder
+from app.window.bind_markers import MarkersBinder
+from app.window.bind_messages import MessagesBinder
+from app.window.bind_scene import SceneBinder
+from app.window.bind_stages import StagesBinder
+from app.window.bind_timelines import TimelinesBinder
+from app.window.bind_transport import TransportBinder
+from app.window.bind_video import VideoBinder
+from app.window.bind_welcome import WelcomeBinder
+from app.window.docks import Docks, Panel
+from app.window.ghosts import Ghosts
+from app.window.keys import KeysFirst
+from app.window.remembering import parts_of, restore
+from app.window.shown import Shown
+from widgets.panels.history import HistoryList
+from widgets.panels.hypotheses import HypothesesView
+from widgets.panels.message_bar import MessageBar
+from widgets.panels.progress_strip import ProgressStrip
+from widgets.panels.stage_panel import StagePanel
+from widgets.panels.transport import Transport
+from widgets.panels.welcome import WelcomePage
+from widgets.plots.affinity import AffinityView
+from widgets.plots.convergence import ConvergenceView
+from widgets.plots.curves import CurvesView
+from widgets.plots.pair import PairPlot
+from widgets.plots.timelines import Timelines
+from widgets.scene import Scene3D
+from widgets.tables.candidates import CandidateTable
+from widgets.tables.markers import MarkerTable
+from widgets.video import VideoView
+
+BUSY_MS, IDLE_MS, REMEMBER_MS = 12, 60, 1500
+_LEFT = Qt.DockWidgetArea.LeftDockWidgetArea
+_RIGHT = Qt.DockWidgetArea.RightDockWidgetArea
+_BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
+
+
+class MainWindow(QMainWindow):
+    """One window on one session.
+
+    Parameters
+    ----------
+    bench : the models
+    make_asks : what asks the user in its place (tests)
+    """
+
+    def __init__(self, bench: Workbench, make_asks: Callable[[MainWindow], Asks] | None = None) -> None:
+        super().__init__()
+        self.bench = bench
+        self._leaving = False
+        self.resize(1500, 940)
+        self.setAcceptDrops(True)
+        self._make_widgets()
+        self.asks: Asks = WindowAsks(self) if make_asks is None else make_asks(self)
+        self.table = Actions(ACTIONS, bench, self.asks)
+        self.menus = Menus(self, self.table)
+        self.shown = Shown(bench)
+        self.ghosts = Ghosts(bench, self.shown)
+        self._bind()
+        self._view_menu()
+        bench.opened.connect(self._opened)
+        bench.document.saved.connect(self._title)
+        bench.document.changed.connect(lambda another: self._title())
+        bench.clock.changed.connect(self._pace)
+        bench.runner.changed.connect(self._pace)
+        self._keys = KeysFirst(self)
+        app = QApplication.instance()
+        assert app is not None
+        app.installEventFilter(self._keys)
+        self._timer = QTimer(self, interval=IDLE_MS)
+        self._timer.timeout.connect(self._tick)
+        self._timer.start()
+        self._remembering = QTimer(self, interval=REMEMBER_MS)
+        self._remembering.timeout.connect(self.remember)
+        self._remembering.start()
+        self._remembered: object = None
+        self._opened()
+
+    def _make_widgets(self) -> None:
+        self.scene, self.video, self.timelines = Scene3D(), VideoView(), Timelines()
+        self.stages, self.transport, self.messages = StagePanel(), Transport(), MessageBar()
+        self.affinity, self.pair = AffinityView(), PairPlot()
+        self.candidates, self.hypotheses = CandidateTable(), HypothesesView()
+        self.convergence, self.markers, self.angles = ConvergenceView(), MarkerTable(), CurvesView()
+        self.history, self.welcome, self.progress = HistoryList(), WelcomePage(), ProgressStrip()
+        self.pair.setVisible(False)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.welcome)
+        self.pages.addWidget(_column(self.scene, self.transport))
+        self.setCentralWidget(_column(self.messages, self.pages))
+        self.statusBar().addPermanentWidget(self.progress, 1)
+        self.statusBar().setSizeGripEnabled(False)
+        self.docks = Docks(
+            self,
+            [
+                Panel("stages", "Stages", self.stages, _LEFT, "Every stage: its state, settings and results"),
+                Panel("history", "History", self.history, _LEFT, "Every decision, to go back to"),
+                Panel("video", "Video", self.video, _RIGHT, "The frame of the clock's time"),
+                Panel("affinity", "Affinity", _column(self.affinity, self.pair), _RIGHT, "Who moves rigidly with whom"),
+                Panel("candidates", "Candidates", self.candidates, _RIGHT, "Where on the body the markers may sit"),
+                Panel("hypotheses", "Hypotheses", self.hypotheses, _RIGHT, "The answers side by side"),
+                Panel("convergence", "Convergence", self.convergence, _RIGHT, "How the energies fell"),
+                Panel("markers", "Markers", self.markers, _RIGHT, "Every marker with its gaps and residuals"),
+                Panel("timelines", "Timelines", self.timelines, _BOTTOM, "All streams along the clock"),
+                Panel("angles", "Angles", self.angles, _BOTTOM, "Joint angles, left and right"),
+            ],
+        )
+
+    def _bind(self) -> None:
+        bench, shown, ghosts = self.bench, self.shown, self.ghosts
+        scene = SceneBinder(self.scene, bench, shown, ghosts)
+        self.binders = [
+            scene,
+            VideoBinder(self.video, bench, shown),
+            TimelinesBinder(self.timelines, bench, shown),
+            StagesBinder(self.stages, self.progress, bench),
+            TransportBinder(self.transport, bench),
+            MessagesBinder(self.messages, bench),
+            AffinityBinder(self.affinity, self.pair, bench, shown, scene),
+            CandidatesBinder(self.candidates, bench, shown, ghosts),
+            HypothesesBinder(self.hypotheses, bench, shown, ghosts),
+            ConvergenceBinder(self.convergence, bench, shown, ghosts),
+            MarkersBinder(self.markers, bench, shown),
+            AnglesBinder(self.angles, bench, shown),
+            HistoryBinder(self.history, bench),
+            WelcomeBinder(self.welcome, bench, self.table, self.open_path),
+        ]
+
+    def _view_menu(self) -> None:
+        panels = self.menus.menus["View"].addMenu("Panels")
+        panels.setToolTipsVisible(True)
+        for dock in self.docks.docks.values():
+            panels.addAction(dock.toggleViewAction())
+
+    # What the actions need
+
+    def open_path(self, path: Path) -> None:
+        """Open a session, or begin one from a marker file; what cannot be opened is said."""
+        self.bench.attempt(lambda: open_path(self.bench, self.asks, path))
+
+    def raise_dock(self, name: str) -> None:
+        """Bring a panel to the front."""
+        self.docks.bring(name)
+
+    def layout_anew(self) -> None:
+        """Put every panel back in its first place."""
+        self.docks.arrange()
+
+    def redraw(self) -> None:
+        """Draw everything again, in other colours."""
+        for child in self.findChildren(QWidget):
+            child.update()
+
+    def leave(self) -> None:
+        """Close without asking again."""
+        self._leaving = True
+        self.close()
+
+    def remember(self) -> None:
+        """Write down how the window looks, if it looks otherwise than before."""
+        if self.bench.document.is_open and self.bench.clock.timing.frames:
+            parts = parts_of(self)
+            known = (parts, self.bench.clock.time, self.bench.selection.state(), self.bench.display.state())
+            if known != self._remembered:
+                self._remembered = known
+                self.bench.remember(**parts)
+
+    # Following the models
+
+    def _opened(self) -> None:
+        is_open = self.bench.document.is_open
+        self.pages.setCurrentIndex(1 if is_open else 0)
+        if is_open != self._docks_shown():
+            self.docks.show(is_open)
+            if is_open:
+                self.docks.arrange()
+        if is_open:
+            restore(self, self.bench.document.view)
+            self.scene.setFocus()
+        self._title()
+
+    def _docks_shown(self) -> bool:
+        return any(dock.isVisible() or not dock.isHidden() for dock in self.docks.docks.values())
+
+    def _title(self) -> None:
+        document = self.bench.document
+        if not document.is_open:
+            self.setWindowTitle("Markerscope")
+        else:
+            unsaved = " (not saved)" if document.dirty else ""
+            self.setWindowTitle(f"{document.name}{unsaved} - Markerscope")
+
+    def _pace(self) -> None:
+        self._timer.setInterval(BUSY_MS if self.bench.busy else IDLE_MS)
+
+    def _tick(self) -> None:
+        self.bench.tick()
+        wanted = BUSY_MS if self.bench.busy else IDLE_MS
+        if self._timer.interval() != wanted:
+            self._timer.setInterval(wanted)
+
+    # Qt's events
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Ask first, if there is something to ask."""
+        if not self._leaving and not may_close(self.bench, self.asks):
+            event.ignore()
+            return
+        self.remember()
+        self._timer.stop()
+        self._remembering.stop()
+        self.bench.close()
+        event.accept()
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Take files."""
+        if event.mimeData().hasUrls():
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Open the first file that was dropped; a video goes to the open session."""
+        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
+        if paths:
+            event.acceptProposedAction()
+            QTimer.singleShot(0, self, lambda: self.drop(paths[0]))
+
+    def drop(self, path: Path) -> None:
+        """Take a file that was dropped."""
+        from app.models import edits
+
+        if path.suffix.lower() in (".mp4", ".mov", ".avi", ".mkv", ".m4v", ".webm") and self.bench.document.is_open:
+            session = self.bench.document.session
+            self.bench.attempt(lambda: self.bench.document.apply(edits.set_input(session, "video_file", path)))
+        else:
+            self.open_path(path)
+
+
+def _column(*widgets: QWidget) -> QWidget:
+    made = QWidget()
+    layout = QVBoxLayout(made)
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(0)
+    for widget in widgets:
+        layout.addWidget(widget, 1 if isinstance(widget, Scene3D | QStackedWidget | AffinityView) else 0)
+    return made

@@ -1,0 +1,167 @@
+"""What there is to draw of each stage, and what is prepared once from it for every view."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from app.models.results import Ref
+from app.models.signal import Signal
+from app.models.workbench import Workbench
+from app.views import bodies
+from app.views.bodies import BodyTrack
+from app.views.tracks import MarkerTracks, tracks_of
+
+if TYPE_CHECKING:
+    from solver.body.model import Body
+    from solver.markers import Markers
+    from solver.solve.results import FittedMotion
+
+WANTED = (
+    "markers", "clean", "landmarks", "prior", "sync", "segment", "localize", "solve", "orient", "fit", "angles",
+)  # fmt: skip
+
+
+class Shown:
+    """The latest result of every stage, stale or not, as soon as it is in memory.
+
+    Attributes
+    ----------
+    changed : emitted with the names of the stages whose result is another, and "compared" where that list is
+    """
+
+    def __init__(self, bench: Workbench) -> None:
+        self.changed: Signal[[frozenset[str]]] = Signal()
+        self.bench = bench
+        self._refs: dict[str, Ref] = {}
+        self._values: dict[str, Any] = {}
+        self._compared: dict[Ref, Any] = {}
+        self._made: dict[str, tuple[Any, Any]] = {}
+        self._bodies: dict[Path | None, Body] = {}
+        bench.board.changed.connect(self.follow)
+        bench.document.changed.connect(self._begin_anew)
+
+    def _begin_anew(self, another: bool) -> None:
+        if another:
+            gone = frozenset(self._refs)
+            self._refs, self._values, self._compared, self._made = {}, {}, {}, {}
+            self.changed.emit(gone)
+            self.follow()
+
+    def follow(self) -> None:
+        """Take what is in memory, have the rest loaded, and tell what is another."""
+        board, changed = self.bench.board, set[str]()
+        for stage in WANTED:
+            latest = board.latest(stage) if self.bench.document.is_open else None
+            ref = None if latest is None else Ref(stage, latest[0])
+            if ref is None:
+                if self._refs.pop(stage, None) is not None:
+                    self._values.pop(stage, None)
+                    changed.add(stage)
+            elif self._refs.get(stage) != ref and self._has(ref):
+                self._refs[stage], self._values[stage] = ref, board.results.get(stage, ref.key)
+                changed.add(stage)
+        fits = {ref for ref in board.compared if ref.stage in ("fit", "angles")}
+        for gone in self._compared.keys() - fits:
+            del self._compared[gone]
+            changed.add("compared")
+        for ref in sorted(fits - self._compared.keys(), key=lambda ref: ref.key):
+            if self._has(ref):
+                self._compared[ref] = board.results.get(ref.stage, ref.key)
+                changed.add("compared")
+        if changed:
+            self.changed.emit(frozenset(changed))
+
+    def _has(self, ref: Ref) -> bool:
+        results = self.bench.board.results
+        if results.is_loaded(ref.stage, ref.key):
+            return True
+        results.loaded.connect(self._loaded)
+        results.load_ahead(ref.stage, ref.key)
+        return False
+
+    def _loaded(self, ref: Ref) -> None:
+        self.follow()
+
+    def get(self, stage: str) -> Any:
+        """A stage's latest result, None where there is none (yet)."""
+        return self._values.get(stage)
+
+    def stale(self, stage: str) -> bool:
+        """Whether what is shown of a stage is not what the settings ask for."""
+        ref = self._refs.get(stage)
+        return ref is not None and self.bench.board.keys.get(stage) != ref.key
+
+    def compared(self, stage: str) -> dict[Ref, Any]:
+        """Results that are shown beside the one in force."""
+        own = self._refs.get(stage)
+        return {ref: value for ref, value in self._compared.items() if ref.stage == stage and ref != own}
+
+    def once(self, name: str, stands_on: tuple[Any, ...], make: Callable[[], Any]) -> Any:
+        """What ``make`` makes, made again only when one of the objects it stands on is another."""
+        known = self._made.get(name)
+        if known is None or len(known[0]) != len(stands_on) or any(a is not b for a, b in zip(known[0], stands_on)):
+            known = stands_on, make()
+            self._made[name] = known
+        return known[1]
+
+    @property
+    def markers(self) -> Markers | None:
+        """The trajectories, cleaned where they have been; None before they are read."""
+        raw, cleaned = self.get("markers"), self.get("clean")
+        if cleaned is not None and (raw is None or cleaned.markers.positions.shape == raw.positions.shape):
+            return cleaned.markers
+        return raw
+
+    @property
+    def fit(self) -> FittedMotion | None:
+        """The fit, where it is of these markers and frames."""
+        motion, markers = self.get("fit"), self.markers
+        if motion is None or markers is None or motion.residual.shape != markers.positions.shape[:2]:
+            return None
+        return motion
+
+    @property
+    def tracks(self) -> MarkerTracks | None:
+        """What there is of every marker in every frame."""
+        markers, motion, cleaned = self.markers, self.fit, self.get("clean")
+        if markers is None:
+            return None
+        cut = cleaned.outliers if cleaned is not None and cleaned.markers is markers else None
+        return self.once("tracks", (markers, motion, cut), lambda: tracks_of(markers, motion, cut))
+
+    @property
+    def body(self) -> Body:
+        """The session's body, with free bone lengths."""
+        given = self.bench.document.session.inputs.get("body_file")
+        path = None if given is None else given.path
+        if path not in self._bodies:
+            from solver.body.bones import with_bone_lengths
+            from solver.body.model import Body
+
+            self._bodies = {path: with_bone_lengths(Body.load(path))}
+        return self._bodies[path]
+
+    @property
+    def track(self) -> BodyTrack | None:
+        """The fitted body over time."""
+        motion = self.get("fit")
+        if motion is None:
+            return None
+        return self.once("track", (motion,), lambda: bodies.of_motion(self.body, motion))
+
+    @property
+    def clusters(self) -> Any:
+        """(M,) group of each marker, None before they are grouped."""
+        found, markers = self.get("segment"), self.markers
+        return found.clusters if found is not None and markers is not None and _same(found, markers) else None
+
+    @property
+    def segmentation(self) -> Any:
+        """The grouping of these markers, None before there is one."""
+        return None if self.clusters is None else self.get("segment")
+
+
+def _same(found: Any, markers: Markers) -> bool:
+    return len(found.clusters) == len(markers.labels)
