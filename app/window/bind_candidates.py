@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from app.models import edits
 from app.models.workbench import Workbench
 from app.views.candidates import CandidateTable as Table
@@ -50,7 +48,8 @@ class CandidatesBinder:
         rows = table.rows
         place = next((i for i, row in enumerate(rows) if row.candidate == pinned), -1) if pinned is not None else -1
         inks = palette.categorical(12)
-        colours = np.stack([inks[max(row.candidate, row.pool, 0) % 12] for row in rows]) if rows else None
+        of_ghost = [max(row.pool if row.candidate < 0 else row.candidate, 0) % 12 for row in rows]
+        colours = inks[of_ghost] if rows else None
         self.widget.set_rows(rows, place, table.score, table.unit, colours)
         self.widget.set_steps(table.steps, self._step)
         self._select()

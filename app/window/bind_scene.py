@@ -108,11 +108,11 @@ class SceneBinder:
         here = {f"ghost {ghost.name}": ghost for ghost in self.ghosts.all} if self._ghosts_on() else {}
         for name in self._ghost_layers - here.keys():
             self.widget.set_mesh(name, None, _NONE)
-            self.widget.set_bones(name, None, BONE_EDGES)
+            self.widget.set_bones(f"{name} bones", None, BONE_EDGES)
         for name, ghost in here.items():
             vertices = ghost.track.vertices(time, "coarse")
             self.widget.set_mesh(name, vertices, ghost.track.faces("coarse"), ghost.colour, ghost.opacity)
-            self.widget.set_bones(name, ghost.track.joints(time), BONE_EDGES, ghost.colour)
+            self.widget.set_bones(f"{name} bones", ghost.track.joints(time), BONE_EDGES, ghost.colour)
         self._ghost_layers = set(here)
 
     def _ghosts_on(self) -> bool:
@@ -138,7 +138,7 @@ class SceneBinder:
         self._legend = None
         for name in self._ghost_layers:
             self.widget.set_mesh(name, None, _NONE)
-            self.widget.set_bones(name, None, BONE_EDGES)
+            self.widget.set_bones(f"{name} bones", None, BONE_EDGES)
         self._ghost_layers = set()
 
     def _opened(self) -> None:

@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QSizePolicy, QTabWidget, QWidget
+
+_GROUPS = (
+    ("stages", "history"),
+    ("video",),
+    ("affinity", "candidates", "hypotheses", "convergence", "markers"),
+    ("timelines", "angles"),
+)
+"""Panels that share a place, from the top of each side."""
 
 
 @dataclass(frozen=True)
@@ -45,24 +52,29 @@ class Docks:
 
     def arrange(self) -> None:
         """Put every panel in its first place."""
-        for panel in self.panels:
-            dock = self.docks[panel.name]
+        size = self.window.size()
+        for dock in self.docks.values():
             dock.setFloating(False)
-            self.window.addDockWidget(panel.area, dock)
+            self.window.removeDockWidget(dock)
+        for group in _GROUPS:
+            first = self.docks[group[0]]
+            self.window.addDockWidget(self._area(group[0]), first)
+            for name in group[1:]:  # at once, so that they never stand below each other, which would stretch the window
+                self.window.tabifyDockWidget(first, self.docks[name])
+        for dock in self.docks.values():
             dock.show()
-        self.window.splitDockWidget(self.docks["video"], self.docks["affinity"], Qt.Orientation.Vertical)
-        for before, after in pairwise(("affinity", "candidates", "hypotheses", "convergence", "markers")):
-            self.window.tabifyDockWidget(self.docks[before], self.docks[after])
-        self.window.tabifyDockWidget(self.docks["stages"], self.docks["history"])
-        self.window.tabifyDockWidget(self.docks["timelines"], self.docks["angles"])
+        self.window.resize(size)
         for name in ("stages", "affinity", "timelines"):
             self.docks[name].raise_()
         width, height = self.window.width(), self.window.height()
         sides = [self.docks["stages"], self.docks["video"]]
-        self.window.resizeDocks(sides, [int(0.24 * width), int(0.31 * width)], Qt.Orientation.Horizontal)
-        self.window.resizeDocks([self.docks["timelines"]], [int(0.3 * height)], Qt.Orientation.Vertical)
+        self.window.resizeDocks(sides, [int(0.23 * width), int(0.35 * width)], Qt.Orientation.Horizontal)
+        self.window.resizeDocks([self.docks["timelines"]], [int(0.33 * height)], Qt.Orientation.Vertical)
         stack = [self.docks["video"], self.docks["affinity"]]
-        self.window.resizeDocks(stack, [int(0.4 * height), int(0.55 * height)], Qt.Orientation.Vertical)
+        self.window.resizeDocks(stack, [int(0.24 * height), int(0.4 * height)], Qt.Orientation.Vertical)
+
+    def _area(self, name: str) -> Qt.DockWidgetArea:
+        return next(panel.area for panel in self.panels if panel.name == name)
 
     def show(self, on: bool) -> None:
         """Show all panels, or none."""

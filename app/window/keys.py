@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QAbstractButton, QAbstractItemView, QAbstractSlider, QComboBox, QWidget
+from PySide6.QtWidgets import QAbstractButton, QAbstractItemView, QAbstractSlider, QApplication, QComboBox, QWidget
 
 from app.models.selection import How
 
@@ -19,20 +19,15 @@ def how(held: Qt.KeyboardModifier) -> How:
     return "add" if held & Qt.KeyboardModifier.ShiftModifier else "replace"
 
 
-class KeysFirst(QObject):
-    """Lets a control that has the focus use its own keys before they are shortcuts of the window.
+def wants(event: QEvent) -> bool:
+    """Whether a key that is about to become a shortcut of the window belongs to the control that has the focus.
 
     Space plays, but presses a button that was reached by Tab; arrows step, but move along a slider or a list.
     """
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Claim the key for the control."""
-        if event.type() == QEvent.Type.ShortcutOverride and isinstance(watched, QWidget):
-            assert isinstance(event, QKeyEvent)
-            if event.modifiers() == Qt.KeyboardModifier.NoModifier and _own(watched, event.key()):
-                event.accept()
-                return True
+    if event.type() != QEvent.Type.ShortcutOverride or not isinstance(event, QKeyEvent):
         return False
+    focus = QApplication.focusWidget()
+    return focus is not None and event.modifiers() == Qt.KeyboardModifier.NoModifier and _own(focus, event.key())
 
 
 def _own(widget: QWidget, key: int) -> bool:

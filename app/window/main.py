@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
-from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 
 from app.actions import ACTIONS, Actions, Asks
 from app.actions.session_actions import may_close, open_path
@@ -30,7 +30,7 @@ from app.window.bind_video import VideoBinder
 from app.window.bind_welcome import WelcomeBinder
 from app.window.docks import Docks, Panel
 from app.window.ghosts import Ghosts
-from app.window.keys import KeysFirst
+from app.window.keys import wants
 from app.window.remembering import parts_of, restore
 from app.window.shown import Shown
 from widgets.panels.history import HistoryList
@@ -84,10 +84,6 @@ class MainWindow(QMainWindow):
         bench.document.changed.connect(lambda another: self._title())
         bench.clock.changed.connect(self._pace)
         bench.runner.changed.connect(self._pace)
-        self._keys = KeysFirst(self)
-        app = QApplication.instance()
-        assert app is not None
-        app.installEventFilter(self._keys)
         self._timer = QTimer(self, interval=IDLE_MS)
         self._timer.timeout.connect(self._tick)
         self._timer.start()
@@ -221,6 +217,13 @@ class MainWindow(QMainWindow):
             self._timer.setInterval(wanted)
 
     # Qt's events
+
+    def event(self, event: QEvent) -> bool:
+        """Leave keys to the control that has the focus, where it has a use for them."""
+        if wants(event):
+            event.accept()
+            return True
+        return super().event(event)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask first, if there is something to ask."""

@@ -1,0 +1,117 @@
+"""The real window, drawn into memory, with somebody who answers its questions."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtWidgets import QApplication
+
+from app.cli_commands import DEMO_VIDEO
+from app.models.home import Home
+from app.models.imports import new_session
+from app.models.workbench import Said, Workbench
+from app.window.main import MainWindow
+from app.window.showing import Showing
+
+SETTINGS: Mapping[str, Mapping[str, Any]] = {
+    "landmarks": {"rate": 10.0},
+    "localize": {"few": 6, "many": 10, "keep": 8},
+    "orient": {"refine": 4},
+}
+"""Those of the other tests of the window: enough for an answer, and quick."""
+EDITS = {"markers": {"start": 2.0, "stop": 4.0}, "sync": {"offset": 0.37}}
+
+
+class Answers:
+    """Answers the questions of the window as a test says."""
+
+    def __init__(self, window: MainWindow, folder: Path) -> None:
+        self.folder = folder
+        self.asked: list[str] = []
+        self.save: bool | None = False
+        self.stop = True
+        self.showing = Showing(window)
+        self._window = window
+
+    def file_to_open(self, what: str) -> Path | None:
+        self.asked.append(what)
+        return None
+
+    def folder_to_save(self, name: str) -> Path | None:
+        self.asked.append("folder")
+        return self.folder / f"{name}.markerscope"
+
+    def file_to_save(self, name: str) -> Path | None:
+        return self.folder / name
+
+    def how_to_import(self, path: Path) -> Mapping[str, Any] | None:
+        made = new_session(path, video=DEMO_VIDEO)
+        return {**made, "settings": {**made["settings"], **SETTINGS}, "edits": EDITS}
+
+    def what_to_export(self) -> tuple[Path, Sequence[str]] | None:
+        return self.folder / "export", ["angles", "report"]
+
+    def save_first(self) -> bool | None:
+        self.asked.append("save")
+        return self.save
+
+    def stop_running(self) -> bool:
+        self.asked.append("stop")
+        return self.stop
+
+    def number(self, question: str, value: float, unit: str) -> float | None:
+        return None
+
+    def pictures(self) -> Sequence[Any]:
+        from app.window.exporting import report_pictures
+
+        return report_pictures(self._window)
+
+    def show(self, what: str) -> None:
+        self.showing.show(what)
+
+    def quit(self) -> None:
+        self._window.leave()
+
+
+@pytest.fixture
+def spin(qapp: QApplication) -> Callable[..., None]:
+    """``spin(until)`` lets the window live until something is so; ``spin()`` until what is pending has been done."""
+
+    def wait(until: Callable[[], bool] | None = None, what: str = "it", seconds: float = 120) -> None:
+        end = time.monotonic() + seconds
+        for _ in range(5):
+            qapp.processEvents()
+        while until is not None and not until():
+            assert time.monotonic() < end, f"waited for {what} for {seconds} s"
+            qapp.processEvents()
+            time.sleep(0.003)
+        qapp.processEvents()
+
+    return wait
+
+
+@pytest.fixture
+def open_window(qapp: QApplication, tmp_path: Path) -> Iterator[Callable[[], MainWindow]]:
+    """Opens a window of the same user; all are closed in the end."""
+    windows: list[MainWindow] = []
+
+    def make() -> MainWindow:
+        home = Home(tmp_path / "home" / "config", tmp_path / "home" / "data")
+        window = MainWindow(Workbench(home), lambda own: Answers(own, tmp_path))
+        window.said: list[Said] = []  # type: ignore[attr-defined,misc]
+        window.bench.said.connect(window.said.append)  # type: ignore[attr-defined]
+        window.show()
+        qapp.processEvents()
+        windows.append(window)
+        return window
+
+    yield make
+    for window in windows:
+        window.leave()
+        window.deleteLater()
+    qapp.processEvents()
