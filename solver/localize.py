@@ -18,6 +18,9 @@ from solver.rotations import exp_so3, kabsch, log_so3
 R_LAB_UPRIGHT_CAMERA = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 """Turns an upright camera's axes (x right, y down, z away) into a z-up lab in which it looks along +y."""
 
+_DOUBT = 2.0
+"""The fewer the markers, the less their distance alone says: n of them tell a tenth apart where one would take n."""
+
 
 @dataclass(frozen=True)
 class Hypothesis:
@@ -55,7 +58,7 @@ class Search:
 
     yaws: int = 8
     rounds: int = 12
-    keep: int = 16
+    keep: int = 160
     any_orientation: bool = False
 
 
@@ -108,7 +111,8 @@ class _Overlay:
         self.markers = np.where(self.seen[..., None], markers, 0.0)
         self.points = points
         self.count = np.maximum(self.seen.sum(axis=1), 1)
-        self.square = np.einsum("nmk,nmk->m", self.markers, self.markers)
+        self.flat = points.transpose(1, 0, 2).reshape(points.shape[1], -1)
+        self.own = np.einsum("nvk,nvk->vn", points, points) @ self.seen
         self.total = max(int(self.seen.sum()), 1)
         self.ever = self.seen.any(axis=0)
 
@@ -132,11 +136,10 @@ class _Overlay:
 
     def _distances(self, turn: np.ndarray, trans: np.ndarray) -> np.ndarray:
         """(V, M) m^2 summed over the frames in which the marker is seen."""
-        placed = self.points @ turn.T + trans[:, None]  # (N, V, 3)
-        flat = placed.transpose(1, 0, 2).reshape(placed.shape[1], -1)
-        product = flat @ self.markers.transpose(0, 2, 1).reshape(flat.shape[1], -1)
-        own = np.einsum("nvk,nvk->vn", placed, placed) @ self.seen
-        return own - 2 * product + self.square
+        # The markers are carried to the body instead of the body to the markers: nearly all is then known beforehand.
+        carried = ((self.markers - trans[:, None]) @ turn) * self.seen[..., None]
+        product = self.flat @ carried.transpose(0, 2, 1).reshape(self.flat.shape[1], -1)
+        return self.own - 2 * product + np.einsum("nmk,nmk->m", carried, carried)
 
     def _register(
         self, chosen: np.ndarray, turn: np.ndarray, all_axes: bool, any_turn: bool
@@ -159,7 +162,11 @@ class _Overlay:
 def _distinct(found: list[Hypothesis], bone_of: dict[int, int], keep: int) -> tuple[Hypothesis, ...]:
     """The cheapest of each group that agree on the camera and on most markers' bones."""
     kept: list[tuple[Hypothesis, np.ndarray]] = []
-    for one in sorted(found, key=lambda h: h.cost):
+    found = sorted(found, key=lambda h: h.cost)
+    limit = found[0].cost * (1 + _DOUBT / np.sqrt(len(found[0].vertex))) ** 2
+    for one in found:
+        if one.cost > limit:
+            break
         bones = np.array([bone_of[int(v)] for v in one.vertex])
         same = any(
             np.linalg.norm(log_so3(one.R_lab_cam.T @ other.R_lab_cam)) < np.radians(15)

@@ -95,7 +95,7 @@ GRAPH = (
     Stage("segment", 1, SegmentSettings, ("clean",), fitting.group_markers, Segmentation, said_segmentation, cost=0.3),
     Stage(
         "localize",
-        1,
+        2,
         LocalizeSettings,
         (*FITTED_TO, "segment", "camera_file"),
         fitting.place_markers,
@@ -105,7 +105,7 @@ GRAPH = (
     ),
     Stage(
         "orient",
-        2,
+        3,
         OrientSettings,
         (*FITTED_TO, "localize", "camera_file"),
         fitting.rank_placements,
@@ -115,7 +115,7 @@ GRAPH = (
     ),
     Stage(
         "fit",
-        1,
+        2,
         FitSettings,
         (*FITTED_TO, "localize", "orient"),
         fitting.fit_every_frame,

@@ -26,8 +26,13 @@ from solver.solve.state import Camera, Energies, Observations, State, Surface, W
 
 _SAME_ENERGY = 1.03
 _SAME_TURN = np.radians(3.0)
-_ENOUGH = 3e-4
+_ENOUGH = 1e-3
 """A phase ends when a step gains less than this share of the energy."""
+
+_SHOWN = 12
+"""Hypotheses that were left behind and are kept to be looked at."""
+_SETTLED = 0.95
+"""Further rounds of choosing places end when one leaves more than this share of the energy."""
 
 
 @dataclass(frozen=True)
@@ -47,16 +52,38 @@ class Phase:
     prior: float = 1.0
 
 
-COARSE = (
-    Phase(0.04, 0.16, 3, free_shape=False, prior=0.5),
-    Phase(0.03, 0.12, 3, reassign=True, prior=0.5),
-    Phase(0.025, 0.10, 3, reassign=True, prior=0.5),
+@dataclass(frozen=True)
+class Round:
+    """One phase for a whole pool of hypotheses, and who goes on from it.
+
+    Attributes
+    ----------
+    phase : the descent of each
+    doubt : n markers tell answers apart whose costs differ by this over the root of n, as a share; nearer ones go on
+    most : so many at most
+    """
+
+    phase: Phase
+    doubt: float
+    most: int
+
+
+_PLACED = Phase(0.02, 0.08, 3, reassign=True, free_placement=True)
+SEARCH = (
+    Round(Phase(0.04, 0.16, 3, free_shape=False, prior=0.5), 2.6, 48),
+    Round(Phase(0.03, 0.12, 3, reassign=True, prior=0.5), 2.3, 24),
+    Round(Phase(0.025, 0.10, 3, reassign=True, prior=0.5), 2.0, 16),
+    Round(_PLACED, 1.7, 12),
+    Round(_PLACED, 1.5, 10),
+    Round(_PLACED, 1.3, 8),
+    Round(_PLACED, 1.2, 8),
 )
+"""On few keyframes: poor starts are dropped early, more of them the clearer it is which are poor."""
 FINE = (
-    Phase(0.02, 0.08, 3, reassign=True, free_placement=True),
     Phase(0.015, 0.06, 4, reassign=True, free_placement=True),
     Phase(0.01, 0.04, 6, free_placement=True),
 )
+"""On many keyframes."""
 
 
 @dataclass(frozen=True)
@@ -84,11 +111,11 @@ class Fit:
 
 
 def start_state(
-    problem: Problem, guess: Hypothesis, weights: Weights, camera: Camera | None = None
+    problem: Problem, guess: Hypothesis, weights: Weights, camera: Camera | None = None, skin: Skin | None = None
 ) -> tuple[State, Surface]:
-    """The video's body laid over the markers as a hypothesis says."""
+    """The video's body laid over the markers as a hypothesis says; ``skin`` is the mean body's, where it is at hand."""
     betas = np.zeros(problem.body.shape_count)
-    skin = Skin(problem.body, betas)
+    skin = skin or Skin(problem.body, betas)
     placement, surface = skin.on_vertices(guess.vertex, weights.offset)
     rotations = problem.seen.prior.copy()
     rotations[:, 0] = guess.R_lab_cam @ rotations[:, 0]
@@ -235,29 +262,37 @@ def relax(
 
     Returns
     -------
-    The refined fits, least energy first, then those that were left behind, likewise
+    The refined fits, least energy first, then the best of those that were left behind, the latest left first
     """
     problem = Problem(body, seen.at(few), landmarks)
-    judge = phase_weights(base, COARSE[-1])
 
-    def first_look(guess: Hypothesis) -> Fit:
-        state, surface = start_state(problem, guess, base, camera)
-        begun = Fit(guess, state, surface, problem.energies(state, judge, surface), ())
-        return _advance(problem, begun, phases=COARSE[:1], base=base, judge=judge)
+    skin = Skin(body, np.zeros(body.shape_count))
 
-    progress(0.0, f"relaxing {len(guesses)} hypotheses")
-    pool = spread(first_look, guesses)
+    def begun(guess: Hypothesis) -> Fit:
+        state, surface = start_state(problem, guess, base, camera, skin)
+        return Fit(guess, state, surface, problem.energies(state, base, surface), ())
+
+    pool = [begun(guess) for guess in guesses]
     say = partial(_tell, progress, guesses)
-    say(pool)
-    # Poor starts are dropped early: each phase costs as much as all before it.
-    for i, phase in enumerate(COARSE[1:]):
+    left: list[Fit] = []
+    best = np.inf
+    for i, round_ in enumerate(SEARCH):
+        progress(0.6 * i / len(SEARCH), f"relaxing {len(pool)} hypotheses")
+        judge = phase_weights(base, round_.phase)
+        pool = spread(partial(_advance, problem, phases=(round_.phase,), base=base, judge=judge), pool)
+        say(pool)
         pool.sort(key=lambda fit: fit.energies.total)
-        count = max(keep * 2, len(guesses) // 2 ** (i + 1))
-        progress(0.3 + 0.15 * i, f"relaxing {count} hypotheses")
-        pool = spread(partial(_advance, problem, phases=(phase,), base=base, judge=judge), pool[:count]) + pool[count:]
-        say(pool[:count])
-    pool.sort(key=lambda fit: fit.energies.total)
+        pool = _basins(pool) if round_.phase.free_placement else pool
+        limit = (1 + round_.doubt / np.sqrt(problem.present.shape[1])) * pool[0].energies.total
+        going = [fit for fit in pool[: round_.most] if fit.energies.total <= limit]
+        left = pool[len(going) :] + left
+        settled = round_.phase is _PLACED and pool[0].energies.total > _SETTLED * best
+        best = pool[0].energies.total if round_.phase is _PLACED else np.inf
+        pool = going
+        if settled:
+            break
     chosen = _varied(pool, keep)
+    left = [fit for fit in pool if not any(fit is one for one in chosen)] + left
     whole = Problem(body, seen.at(many), landmarks)
     judge = _judging(phase_weights(base, FINE[-1]), whole)
     progress(0.6, f"refining {len(chosen)} hypotheses")
@@ -277,7 +312,7 @@ def relax(
     fine = spread(partial(_advance, whole, phases=FINE[1:], base=base, judge=judge), fine)
     fine.sort(key=lambda fit: fit.energies.total)
     say(fine)
-    return tuple(fine) + tuple(fit for fit in pool if not any(fit is one for one in chosen))
+    return tuple(fine) + tuple(left[:_SHOWN])
 
 
 def _tell(progress: Progress, guesses: Sequence[Hypothesis], fits: Sequence[Fit]) -> None:

@@ -12,13 +12,14 @@ from solver.errors import InputError
 from solver.localize import Hypothesis, Search, hypotheses
 from solver.progress import Progress, silent
 from solver.rotations import log_so3
-from solver.solve.bundle import Fit, relax
+from solver.solve.bundle import FINE, Fit, descend, relax
 from solver.solve.kinematics import Points, Pose, forward, place_points
 from solver.solve.placement import Skin
 from solver.solve.problem import Problem
 from solver.solve.refine import every_frame
 from solver.solve.results import CameraResult, Candidate, FittedMotion, Localization, Orientation, Steps
 from solver.solve.state import Camera, Observations, State, Surface, Weights
+from solver.solve.trust import believed, trusted
 
 _REACH_M = 2.0
 """No marker on a person is usually further from the middle of all markers."""
@@ -40,15 +41,15 @@ class LocalizeSettings:
     ----------
     yaws : starts of the camera's heading, evenly spread over the circle
     few, many : keyframes of the coarse and of the fine solve
-    keep : hypotheses handed on
+    keep : hypotheses handed on at most; those that are clearly worse than the best are not
     seen_share : share of the frames in which a marker must be seen to be used in the search
     any_orientation : also try lab frames that do not stand upright
     """
 
     yaws: int = 8
-    few: int = 12
+    few: int = 16
     many: int = 40
-    keep: int = 16
+    keep: int = 160
     seen_share: float = 0.05
     any_orientation: bool = False
 
@@ -66,6 +67,7 @@ class OrientSettings:
     refine : hypotheses refined to the end
     offset_mm, offset_spread_mm : marker centre above the skin; the spread holds what the shapes miss of a real skin
     prior_deg : spread of the video's joint rotations
+    bias_deg : spread of what a reconstruction that came without landmarks gets wrong alike in every frame
     focal_guess : focal length as a share of the image's longer side, where no camera is given
     """
 
@@ -73,11 +75,12 @@ class OrientSettings:
     offset_mm: float = 9.5
     offset_spread_mm: float = 6.0
     prior_deg: float = 18.0
+    bias_deg: float = 15.0
     focal_guess: float = 0.85
 
     def __post_init__(self) -> None:
         """Refuse what cannot work."""
-        _positive(self, "refine", "offset_spread_mm", "prior_deg", "focal_guess")
+        _positive(self, "refine", "offset_spread_mm", "prior_deg", "bias_deg", "focal_guess")
 
     def weights(self) -> Weights:
         """The same as weights of the fit."""
@@ -85,6 +88,7 @@ class OrientSettings:
             offset=self.offset_mm / 1000,
             offset_spread=self.offset_spread_mm / 1000,
             prior_deg=self.prior_deg,
+            bias_deg=self.bias_deg,
             focal_guess=self.focal_guess,
         )
 
@@ -208,7 +212,7 @@ def orient(
             found.vertex, found.R_lab_cam, found.trans, found.cost_mm, found.start, found.yaw_deg, strict=True
         )
     )
-    weights = settings.weights()
+    weights = replace(settings.weights(), free_bias=not _sees_landmarks(used))
     known = None
     if camera is not None:
         known = _camera_of(camera, used.lab_centre)
@@ -251,13 +255,10 @@ def fit(
         )
     chosen = ranked.candidates[row]
     used = replace(seen, markers=seen.markers[:, found.markers])
-    placement = Points(chosen.rest, chosen.dirs, chosen.weights)
-    surface = Surface(chosen.surface, chosen.normal)
     frames = found.many if chosen.refined else found.few
-    state = State(
-        Pose(chosen.rotations, chosen.trans, chosen.betas), placement, _camera_of(chosen.camera, used.lab_centre)
-    )
-    pose = every_frame(body, used, landmarks, frames, state, surface, settings.weights(), progress)
+    state, surface, weights = _settled(body, used.at(frames), landmarks, chosen, settings)
+    placement = state.placement
+    pose = every_frame(body, used, landmarks, frames, state, surface, weights, progress)
     links = forward(body, pose)
     count = seen.markers.shape[1]
     placed = np.full((len(time), count, 3), np.nan)
@@ -280,6 +281,33 @@ def fit(
         confidence=1.0 if pinned else ranked.confidence,
         warnings=(f"Candidate {row} was pinned by hand.",) if pinned else ranked.warnings,
     )
+
+
+def _sees_landmarks(seen: Observations) -> bool:
+    """Whether the video's landmarks are there: its pose was lifted from them then, and errs in depth, now so, now so.
+
+    A reconstruction without them keeps much of its error from frame to frame.
+    """
+    return bool(np.isfinite(seen.image).any())
+
+
+def _settled(
+    body: Body, seen: Observations, landmarks: Points, chosen: Candidate, settings: FitSettings
+) -> tuple[State, Surface, Weights]:
+    """The keyframes once more, the video trusted as far as it turned out to be right."""
+    problem, weights = Problem(body, seen, landmarks), settings.weights()
+    state = State(
+        Pose(chosen.rotations, chosen.trans, chosen.betas),
+        Points(chosen.rest, chosen.dirs, chosen.weights),
+        _camera_of(chosen.camera, seen.lab_centre),
+        chosen.bias,
+    )
+    surface = Surface(chosen.surface, chosen.normal)
+    if problem.in_image.any():
+        return state, surface, weights
+    weights = trusted(seen, state, believed(weights))
+    state, surface, _ = descend(problem, state, surface, FINE[-1:], weights)
+    return state, surface, weights
 
 
 def _camera_of(camera: CameraResult, centre: np.ndarray) -> Camera:
@@ -327,6 +355,7 @@ def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem, steps: 
         rotations=state.pose.rotations,
         trans=state.pose.trans,
         trace=fitted.trace,
+        bias=state.bias,
         steps=steps,
     )
 

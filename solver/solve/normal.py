@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy.linalg.lapack import dtrtrs
 
 from solver.body.skeleton import INDEX, descendants
 from solver.solve.kinematics import Chain, Points, pose_jacobian
@@ -109,13 +110,19 @@ class NormalEquations:
         h_ss = self.h_ss[np.ix_(free, free)]
         h_ss[np.diag_indices(len(free))] *= 1 + damping
         h_ss[np.diag_indices(len(free))] += 1e-9
-        cross = np.ascontiguousarray(self.h_fs[:, :, free])
-        solved = np.linalg.solve(self.h_ff, np.concatenate([cross, self.g_f[..., None]], axis=2))
-        stacked = cross.reshape(-1, len(free))
-        reduced = h_ss - stacked.T @ solved[..., :-1].reshape(-1, len(free))
-        slope = self.g_s[free] - stacked.T @ solved[..., -1].ravel()
-        shared[free] = -np.linalg.solve(reduced, slope)
-        return -solved[..., -1] - solved[..., :-1] @ shared[free], shared
+        # With L L^T = h_ff, everything that the frames say of the shared unknowns is one product of L^-1 [h_fs, g_f].
+        frames, size = self.g_f.shape
+        lower = np.linalg.cholesky(self.h_ff)
+        rows = np.empty((frames, len(free) + 1, size))
+        rows[:, :-1] = self.h_fs[:, :, free].swapaxes(1, 2)
+        rows[:, -1] = self.g_f
+        for of_frame, factor in zip(rows, lower, strict=True):
+            of_frame[:] = dtrtrs(factor.T, of_frame.T, lower=0, trans=1)[0].T
+        product = (rows @ rows.swapaxes(1, 2)).sum(axis=0)
+        shared[free] = -np.linalg.solve(h_ss - product[:-1, :-1], self.g_s[free] - product[:-1, -1])
+        known = rows[:, -1] + np.einsum("fks,k->fs", rows[:, :-1], shared[free])
+        step = [dtrtrs(factor.T, one, lower=0, trans=0)[0] for factor, one in zip(lower, known, strict=True)]
+        return -np.stack(step), shared
 
 
 def group_jacobian(points: Points, group: Group, links: Chain, betas: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from solver.rotations import exp_so3, right_jacobian_inverse, skew
 from solver.solve.kinematics import Chain, Points, Pose, blended_turn, forward, place_points, shape_jacobian
 from solver.solve.normal import NormalEquations, group_jacobian, groups
 from solver.solve.residuals import (
+    bias_residual,
     focal_residual,
     habit_residual,
     height_residual,
@@ -51,7 +52,8 @@ class Problem:
         count, shapes = self.present.shape[1], body.shape_count
         self.shape_at = slice(0, shapes)
         self.camera_at = slice(shapes, shapes + CAMERA_SIZE)
-        self.placement_at = slice(shapes + CAMERA_SIZE, shapes + CAMERA_SIZE + 3 * count)
+        self.bias_at = slice(self.camera_at.stop, self.camera_at.stop + 3 * len(FREE))
+        self.placement_at = slice(self.bias_at.stop, self.bias_at.stop + 3 * count)
 
     def energies(self, state: State, weights: Weights, surface: Surface) -> Energies:
         """What the state costs, per frame."""
@@ -66,7 +68,7 @@ class Problem:
             image += (focal_residual(state.camera, self.seen.image_size, weights) / weights.focal_spread) ** 2
         return Energies(
             markers=float(marker_residual(where, self.target, self.present, weights)[2].sum()) / frames,
-            prior=float(video_residual(self.seen, state, weights)[2].sum()) / frames,
+            prior=float(video_residual(self.seen, state, weights)[2].sum() + self._bias(state, weights)) / frames,
             anatomical=float(habit_residual(state, weights)[2].sum()) / frames,
             image=image / frames,
             shape=weights.shape * float(betas @ betas),
@@ -96,6 +98,10 @@ class Problem:
         points = place_points(self.landmarks, forward(self.body, state.pose), state.pose.betas)
         gap = state.camera.project(points, self.seen.image_size) - self.pixels
         return float(np.median(np.linalg.norm(gap, axis=2)[self.in_image]))
+
+    def _bias(self, state: State, weights: Weights) -> float:
+        """What the video's bias costs, once and not in every frame."""
+        return float((bias_residual(state) ** 2).sum() / np.radians(weights.bias_deg) ** 2)
 
     def _image(self, local: np.ndarray, state: State, weights: Weights) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         size = self.seen.image_size
@@ -184,6 +190,13 @@ class Problem:
         for k in range(len(FREE)):
             sums.h_ff[:, 3 * k : 3 * k + 3, 3 * k : 3 * k + 3] += block[:, k]
         sums.g_f[:, :-3] += slope.reshape(len(slope), -1)
+        by_bias = -np.swapaxes(by_turn, -1, -2)
+        for k in range(1, len(FREE)):
+            at = slice(self.bias_at.start + 3 * k, self.bias_at.start + 3 * k + 3)
+            weighted = trust[:, k, None, None] * by_bias[:, k]
+            sums.h_fs[:, 3 * k : 3 * k + 3, at] += np.swapaxes(by_turn[:, k], -1, -2) @ weighted
+            sums.h_ss[at, at] += np.einsum("nia,nib->ab", by_bias[:, k], weighted)
+            sums.g_s[at] += np.einsum("nia,ni->a", weighted, video[:, k])
         turn_at = slice(self.camera_at.start, self.camera_at.start + 3)
         by_camera = -by_turn[:, 0] @ np.swapaxes(state.pose.rotations[:, 0], -1, -2)
         weighted = trust[:, 0, None, None] * by_camera
@@ -192,10 +205,13 @@ class Problem:
         sums.g_s[turn_at] += np.einsum("nia,ni->a", weighted, video[:, 0])
 
     def _add_shared(self, sums: NormalEquations, state: State, surface: Surface, weights: Weights) -> None:
-        """Priors of shape and of each marker's height over the skin; damping of its slide along it."""
+        """Priors of shape, of the video's bias, of each marker's height over the skin; damping of its slide."""
         strength = len(self.target) * weights.shape
         sums.h_ss[self.shape_at, self.shape_at] += strength * np.eye(self.shape_at.stop)
         sums.g_s[self.shape_at] += strength * state.pose.betas
+        bias = np.radians(weights.bias_deg) ** -2
+        sums.h_ss[self.bias_at, self.bias_at] += bias * np.eye(3 * len(FREE))
+        sums.g_s[self.bias_at] += bias * bias_residual(state).ravel()
         height = height_residual(state, surface, weights)
         for m, normal in enumerate(surface.normal):
             start = self.placement_at.start + 3 * m
@@ -210,6 +226,7 @@ class Problem:
         free[self.camera_at] = weights.free_camera
         if not self.in_image.any():
             free[self.camera_at.start + 3 : self.camera_at.stop] = False
+        free[self.bias_at.start + 3 : self.bias_at.stop] = weights.free_bias
         free[self.placement_at] = weights.free_placement
         return np.flatnonzero(free)
 
@@ -231,6 +248,7 @@ class Problem:
                 shift=state.camera.shift + shift,
                 focal=float(state.camera.focal * np.exp(zoom[0].clip(-0.2, 0.2))),
             ),
+            state.bias @ exp_so3(shared[self.bias_at].reshape(-1, 3).clip(-_LARGEST_TURN, _LARGEST_TURN)),
         )
 
 

@@ -38,7 +38,7 @@ def every_frame(
     """
     frames = len(seen.markers)
     start = carried_over(body, seen, keyframes, fitted)
-    held = replace(base, free_shape=False, free_placement=False, free_camera=False)
+    held = replace(base, free_shape=False, free_placement=False, free_camera=False, free_bias=False)
     rotations, trans = start.rotations.copy(), start.trans.copy()
 
     def solve(first: int) -> None:

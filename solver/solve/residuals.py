@@ -28,8 +28,8 @@ def marker_residual(
 
 
 def video_residual(seen: Observations, state: State, weights: Weights) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(N, K, 3) rad between each joint and the video's pose turned into the lab; Cauchy weight and cost (N, K)."""
-    expected = seen.prior[:, FREE].copy()
+    """(N, K, 3) rad between each joint and the video's, its bias undone; Cauchy weight and cost (N, K)."""
+    expected = seen.prior[:, FREE] @ state.bias
     expected[:, 0] = state.camera.R_lab_cam @ expected[:, 0]
     residual = log_so3(np.swapaxes(expected, -1, -2) @ state.pose.rotations[:, FREE])
     spread = np.full(len(FREE), np.radians(weights.prior_deg))
@@ -38,6 +38,12 @@ def video_residual(seen: Observations, state: State, weights: Weights) -> tuple[
     squared = np.einsum("njk,njk->nj", residual, residual)
     kernel = (3 * spread) ** 2
     return residual, trust / (1 + squared / kernel), trust * kernel * np.log1p(squared / kernel)
+
+
+def bias_residual(state: State) -> np.ndarray:
+    """(K, 3) rad, how far the video's joints are off on average."""
+    turned: np.ndarray = log_so3(state.bias)
+    return turned
 
 
 def habit_residual(state: State, weights: Weights) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+
+from solver.solve.state import no_bias
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,7 @@ class Candidate:
     betas : (S,) shape, bone lengths last
     rotations, trans : pose of the keyframes, lab frame
     trace : total energy after each step
+    bias : (K, 3, 3) what turns the video's joints towards the true ones, in every frame alike
     steps : the body after each of these, where it was kept
     """
 
@@ -113,6 +116,7 @@ class Candidate:
     rotations: np.ndarray
     trans: np.ndarray
     trace: tuple[float, ...]
+    bias: np.ndarray = field(default_factory=no_bias)
     steps: Steps | None = None
 
 

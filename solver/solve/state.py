@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -74,13 +74,28 @@ class Camera:
         return self.focal * seen[..., :2] / np.maximum(seen[..., 2:], 0.05) + np.array(image_size) / 2
 
 
+def no_bias() -> np.ndarray:
+    """(K, 3, 3) for a video whose pose is right on average."""
+    return np.tile(np.eye(3), (len(FREE), 1, 1))
+
+
 @dataclass(frozen=True)
 class State:
-    """One guess at everything: the pose, where the markers sit, and the camera."""
+    """One guess at everything.
+
+    Attributes
+    ----------
+    pose : of every frame
+    placement : where the markers sit
+    camera : how the video's frame stands in the lab
+    bias : (K, 3, 3) what turns the video's joints, each alike in every frame, towards the true ones; the root, which
+        turns with the camera, has none
+    """
 
     pose: Pose
     placement: Points
     camera: Camera
+    bias: np.ndarray = field(default_factory=no_bias)
 
 
 @dataclass(frozen=True)
@@ -91,7 +106,8 @@ class Weights:
     ----------
     marker : m, spread of a marker about its place on the skin
     marker_kernel : m, beyond this a marker counts as an outlier (Geman-McClure)
-    prior_deg : spread of the video's joint rotations
+    prior_deg : spread of the video's joint rotations about their bias
+    bias_deg : spread of that bias, which a reconstruction from one camera keeps from frame to frame
     root_deg : spread of the video's root rotation, once the camera is turned right
     anatomical : share of the anatomical prior
     image : spread of a 2D landmark as a share of the person's height in the image
@@ -100,12 +116,14 @@ class Weights:
         marker's own 2 mm and what the shapes miss of a real skin
     slide : m, how far a marker may slide over the skin in one step
     focal_spread : natural logarithm of the focal length
-    free_camera, free_shape, free_placement : False holds the camera, the shape, or where markers sit
+    free_camera, free_shape, free_placement, free_bias : False holds the camera, the shape, where markers sit, or the
+        video's bias
     """
 
     marker: float = 0.01
     marker_kernel: float = 0.03
     prior_deg: float = 18.0
+    bias_deg: float = 15.0
     root_deg: float = 25.0
     anatomical: float = 0.3
     image: float = 0.025
@@ -119,6 +137,7 @@ class Weights:
     free_camera: bool = True
     free_shape: bool = True
     free_placement: bool = True
+    free_bias: bool = True
 
 
 @dataclass(frozen=True)

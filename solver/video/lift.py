@@ -35,6 +35,7 @@ _WEIGHTS = Weights(
     shape=0.1,
     free_placement=False,
     free_camera=False,
+    free_bias=False,
 )
 _ROUNDS = 5
 _SMOOTH_S = 0.15
