@@ -7,11 +7,11 @@ ENV = $(PYTHON) tools/setup_env.py
 export OMP_NUM_THREADS ?= 1
 export OMP_WAIT_POLICY ?= passive
 
-.PHONY: demo test lint format setup need-python
+.PHONY: demo test lint format setup screenshots need-python
 
-# Solve the embedded session and say how close it came to the known truth.
+# The embedded session in the window; without a display, how close its solve comes to the known truth.
 demo: need-python
-	$(ENV) markerscope demo --headless --out demo-out
+	$(ENV) markerscope demo --out demo-out
 
 # Everything that must hold.
 test: lint
@@ -25,6 +25,10 @@ lint: need-python
 format: need-python
 	$(ENV) ruff check --fix .
 	$(ENV) ruff format .
+
+# The pictures of the manual, made without a display.
+screenshots: need-python
+	$(ENV) python tools/screenshots.py
 
 setup: need-python
 	$(ENV)

@@ -125,7 +125,7 @@ class MainWindow(QMainWindow):
 
     def _bind(self) -> None:
         bench, shown, ghosts = self.bench, self.shown, self.ghosts
-        scene = SceneBinder(self.scene, bench, shown, ghosts)
+        self.scene_binder = scene = SceneBinder(self.scene, bench, shown, ghosts)
         self.binders = [
             scene,
             VideoBinder(self.video, bench, shown),
@@ -165,6 +165,7 @@ class MainWindow(QMainWindow):
 
     def redraw(self) -> None:
         """Draw everything again, in other colours."""
+        self.scene_binder.draw()
         for child in self.findChildren(QWidget):
             child.update()
 
