@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.body.skeleton import JOINTS, mirror_index
+from solver.body.skeleton import JOINTS, PARENTS, mirror_index
 from solver.rotations import log_so3
 from solver.solve.results import Candidate, Orientation
-from solver.solve.state import Observations
 
 _SAME_BONES = 0.8
 _SAME_TURN_DEG = 35.0
 _STILL_DEG = 12.0
+_JUDGED = 3
 _TIE = 1.15
 _STEEPNESS = 1.75 / np.log(_TIE)
 
 
-def judge(candidates: tuple[Candidate, ...], seen: Observations) -> Orientation:
+def judge(candidates: tuple[Candidate, ...]) -> Orientation:
     """Rank is given; find the best different answer, and say what is ambiguous."""
     best = candidates[0]
     rivals = [i for i, c in enumerate(candidates) if c.refined and i and not same_answer(best, c)]
     runner_up = rivals[0] if rivals else -1
     margin = candidates[runner_up].energy / max(best.energy, 1e-9) if rivals else float("inf")
-    still = stillness(seen)
+    still = stillness(best.rotations, best.bone)
     warnings = list(still)
     if rivals and margin < _TIE:
         warnings.append(_tie(best, candidates[runner_up], margin))
@@ -32,14 +32,23 @@ def judge(candidates: tuple[Candidate, ...], seen: Observations) -> Orientation:
     return Orientation(candidates, float(margin), runner_up, confidence, tuple(warnings))
 
 
-def stillness(seen: Observations) -> tuple[str, ...]:
-    """What to say where the person moves too little for markers to be told apart; nothing otherwise."""
-    moved = movement_deg(seen.prior)
+def stillness(rotations: np.ndarray, bone: np.ndarray) -> tuple[str, ...]:
+    """What to say where the marked limbs bend too little for markers to be told apart; nothing otherwise.
+
+    Parameters
+    ----------
+    rotations : (N, 24, 3, 3) of the keyframes, as fitted
+    bone : (U,) bone of each marker
+    """
+    marked = np.zeros(len(JOINTS), dtype=bool)
+    marked[bone[bone >= 0]] = True
+    inner = [j for j in range(1, len(JOINTS)) if marked[j] and marked[PARENTS[j]]]
+    moved = movement_deg(rotations, inner)
     if moved >= _STILL_DEG:
         return ()
     return (
-        f"The person hardly moves (joints turn by {moved:.0f} degrees in the video), so markers cannot be told "
-        "apart by their motion: check which bones they were given to.",
+        f"The person hardly moves where the markers are (joints turn by {moved:.0f} degrees), so markers cannot be "
+        "told apart by their motion: check which bones they were given to.",
     )
 
 
@@ -59,12 +68,14 @@ def _bone_agreement(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.mean(one == other))
 
 
-def movement_deg(prior: np.ndarray) -> float:
-    """How far the person's limbs turn in the video: degrees, the third largest of the joints' ranges."""
-    middle = prior[len(prior) // 2]
-    turns = np.degrees(log_so3(np.swapaxes(middle, -1, -2) @ prior[:: max(1, len(prior) // 400)]))
+def movement_deg(rotations: np.ndarray, joints: list[int]) -> float:
+    """How far joints turn: degrees, the third largest of the given joints' ranges, or the last of fewer; 0 of none."""
+    if not joints:
+        return 0.0
+    some = rotations[:: max(1, len(rotations) // 400)][:, joints]
+    turns = np.degrees(log_so3(np.swapaxes(rotations[len(rotations) // 2][joints], -1, -2) @ some))
     spread = np.linalg.norm(np.percentile(turns, 95, axis=0) - np.percentile(turns, 5, axis=0), axis=-1)
-    return float(np.sort(spread[:22])[-3])
+    return float(np.sort(spread)[::-1][:_JUDGED][-1])
 
 
 def _tie(best: Candidate, rival: Candidate, margin: float) -> str:

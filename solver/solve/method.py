@@ -234,7 +234,7 @@ def orient(
     candidates = tuple(
         _candidate(body, fit, index[id(fit.start)], whole, _steps(fit.poses, found.few, found.many)) for fit in fits
     )
-    return judge(candidates, used)
+    return judge(candidates)
 
 
 def fit(

@@ -48,7 +48,7 @@ def orientation_of(
         candidates.append(_candidate(body, used, landmarks, state, vertex, int(i), energies, trace, solved))
     for row in np.argsort([chain.chamfer for chain in found.candidates])[:_CHAINS_SHOWN]:
         candidates.append(_of_chain(body, seen, landmarks, found, int(row), solved))
-    return _judged(tuple(candidates), seen, solved)
+    return _judged(tuple(candidates), solved)
 
 
 def _candidate(
@@ -105,11 +105,11 @@ def _of_chain(
     return _candidate(body, used, landmarks, state, vertex, row, energies, trace, solved, refined=False)
 
 
-def _judged(candidates: tuple[Candidate, ...], seen: Observations, solved: PaperSolve) -> Orientation:
+def _judged(candidates: tuple[Candidate, ...], solved: PaperSolve) -> Orientation:
     """The margin of the first candidate over the best different yaw, and what there is to doubt."""
     rivals = [i for i, c in enumerate(candidates) if c.refined and i and not same_answer(candidates[0], c)]
     margin = candidates[rivals[0]].energy / max(candidates[0].energy, 1e-9) if rivals else float("inf")
-    warnings = list(stillness(seen))
+    warnings = list(stillness(candidates[0].rotations, candidates[0].bone))
     descents = [stage.descent for yaw in solved.yaws for stage in (yaw.pose, yaw.markers)] + [solved.refined.descent]
     capped = sum(not descent.converged for descent in descents)
     if capped:
