@@ -58,7 +58,7 @@ class WindowAsks:
 
     def how_to_import(self, path: Path) -> Mapping[str, Any] | None:
         """How to read a marker file."""
-        return ask_how_to_import(self.window, path, lambda: self.file_to_open("video"))
+        return ask_how_to_import(self.window, path, lambda: self.file_to_open("video"), self.window.dropped_video)
 
     def what_to_export(self) -> tuple[Path, Sequence[str]] | None:
         """Which folder, and which formats."""

@@ -15,7 +15,12 @@ class WelcomeBinder:
     """Fills the list of recent sessions."""
 
     def __init__(
-        self, widget: WelcomePage, bench: Workbench, actions: Actions, open_path: Callable[[Path], object]
+        self,
+        widget: WelcomePage,
+        bench: Workbench,
+        actions: Actions,
+        open_path: Callable[[Path], object],
+        drop: Callable[[list[Path]], object],
     ) -> None:
         self.widget, self.bench = widget, bench
         bench.document.saved.connect(self.fill)
@@ -24,7 +29,7 @@ class WelcomeBinder:
         widget.markers_wanted.connect(lambda: actions.trigger("session.markers"))
         widget.session_wanted.connect(lambda: actions.trigger("session.open"))
         widget.recent_chosen.connect(lambda path: open_path(Path(path)))
-        widget.files_dropped.connect(lambda paths: [open_path(Path(path)) for path in paths[:1]])
+        widget.files_dropped.connect(lambda paths: drop([Path(path) for path in paths]))
         self.fill()
 
     def fill(self) -> None:

@@ -69,7 +69,9 @@ class Importing:
         )
 
 
-def ask_how_to_import(parent: QWidget, path: Path, video: Callable[[], Path | None]) -> Mapping[str, Any] | None:
+def ask_how_to_import(
+    parent: QWidget, path: Path, video: Callable[[], Path | None], proposed: Path | None = None
+) -> Mapping[str, Any] | None:
     """Ask; None where the user would rather not."""
     dialog = ImportDialog(parent)
     dialog.setWindowTitle(f"Open {path.name}")
@@ -82,8 +84,8 @@ def ask_how_to_import(parent: QWidget, path: Path, video: Callable[[], Path | No
 
     dialog.video_wanted.connect(choose_video)
     beside = [file for suffix in (".mp4", ".mov", ".avi", ".mkv") if (file := path.with_suffix(suffix)).exists()]
-    if beside:
-        dialog.set_video(str(beside[0]))
+    if proposed is not None or beside:
+        dialog.set_video(str(proposed or beside[0]))
     agreed = dialog.exec() == QDialog.DialogCode.Accepted
     found = importing.session() if agreed else None
     dialog.deleteLater()

@@ -11,7 +11,8 @@ from PySide6.QtWidgets import QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 
 from app.actions import ACTIONS, Actions, Asks
 from app.actions.session_actions import may_close, open_path
-from app.models.workbench import Workbench
+from app.models import edits
+from app.models.workbench import Said, Workbench
 from app.window.actions import Menus
 from app.window.asks import WindowAsks
 from app.window.bind_affinity import AffinityBinder
@@ -50,6 +51,7 @@ from widgets.tables.candidates import CandidateTable
 from widgets.tables.markers import MarkerTable
 from widgets.video import VideoView
 
+VIDEOS = (".mp4", ".mov", ".avi", ".mkv", ".m4v", ".webm")
 BUSY_MS, IDLE_MS, REMEMBER_MS = 12, 60, 1500
 _LEFT = Qt.DockWidgetArea.LeftDockWidgetArea
 _RIGHT = Qt.DockWidgetArea.RightDockWidgetArea
@@ -69,6 +71,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.bench = bench
         self._leaving = False
+        self.dropped_video: Path | None = None
         self.resize(1500, 940)
         self.setAcceptDrops(True)
         self._make_widgets()
@@ -140,7 +143,7 @@ class MainWindow(QMainWindow):
             MarkersBinder(self.markers, bench, shown),
             AnglesBinder(self.angles, bench, shown),
             HistoryBinder(self.history, bench),
-            WelcomeBinder(self.welcome, bench, self.table, self.open_path),
+            WelcomeBinder(self.welcome, bench, self.table, self.open_path, self.drop),
         ]
 
     def _view_menu(self) -> None:
@@ -247,17 +250,21 @@ class MainWindow(QMainWindow):
         paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
         if paths:
             event.acceptProposedAction()
-            QTimer.singleShot(0, self, lambda: self.drop(paths[0]))
+            QTimer.singleShot(0, self, lambda: self.drop(paths))
 
-    def drop(self, path: Path) -> None:
-        """Take a file that was dropped."""
-        from app.models import edits
-
-        if path.suffix.lower() in (".mp4", ".mov", ".avi", ".mkv", ".m4v", ".webm") and self.bench.document.is_open:
-            session = self.bench.document.session
-            self.bench.attempt(lambda: self.bench.document.apply(edits.set_input(session, "video_file", path)))
-        else:
-            self.open_path(path)
+    def drop(self, paths: list[Path]) -> None:
+        """Take files that were dropped: a session or a marker file, perhaps with its video; or a video alone."""
+        videos = [path for path in paths if path.suffix.lower() in VIDEOS]
+        others = [path for path in paths if path not in videos]
+        if others:
+            self.dropped_video = videos[0] if videos else None
+            self.open_path(others[0])
+            self.dropped_video = None
+        elif videos and self.bench.document.is_open:
+            edit = edits.set_input(self.bench.document.session, "video_file", videos[0])
+            self.bench.attempt(lambda: self.bench.document.apply(edit))
+        elif videos:
+            self.bench.say(Said("note", "A session begins with markers", videos[0].name, "open a marker file first"))
 
 
 def _column(*widgets: QWidget) -> QWidget:

@@ -161,7 +161,7 @@ class AffinityView(QWidget):
         line = QFontMetricsF(self.font()).height()
         if self._image is None:
             painter.setPen(colour(look.faint))
-            text = "The markers are not grouped yet: run the stage Segment."
+            text = "The markers are not grouped yet: run the stage Segmentation."
             flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
             painter.drawText(QRectF(self.rect()).adjusted(12, 12, -12, -12), int(flags), text)
             return

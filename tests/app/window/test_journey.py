@@ -222,3 +222,21 @@ def test_what_a_crash_left_is_offered(open_window: Callable[[], MainWindow], spi
     other.welcome.recent_chosen.emit(str(journal))
     spin(lambda: other.bench.clock.timing.frames == 201, "the session that was left")
     assert any("is back" in said.what for said in other.said)  # type: ignore[attr-defined]
+
+
+def test_a_marker_file_and_its_video_can_be_dropped_together(
+    open_window: Callable[[], MainWindow], spin: Spin, tmp_path: Path
+) -> None:
+    window = open_window()
+    window.drop([tmp_path / "alone.mp4"])
+    assert window.said[-1].level == "note" and not window.bench.document.is_open  # type: ignore[attr-defined]
+    proposed: list[Path | None] = []
+    answer = window.asks.how_to_import
+
+    def watched(path: Path) -> object:
+        proposed.append(window.dropped_video)
+        return answer(path)
+
+    window.asks.how_to_import = watched  # type: ignore[method-assign,assignment]
+    window.drop([tmp_path / "squat.mp4", DEMO_MARKERS])
+    assert window.bench.document.is_open and proposed == [tmp_path / "squat.mp4"] and window.dropped_video is None
