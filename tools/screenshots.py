@@ -37,6 +37,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images")
     options = parser.parse_args()
 
+    from PySide6.QtCore import QEvent
     from PySide6.QtWidgets import QApplication
 
     from app.models.home import Home
@@ -52,6 +53,7 @@ def main() -> int:
         end = time.monotonic() + rest
         while time.monotonic() < end or (until is not None and not until()):
             app.processEvents()
+            app.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)  # only a running event loop does it
             time.sleep(0.004)
 
     with tempfile.TemporaryDirectory() as folder:
@@ -66,6 +68,9 @@ def main() -> int:
         window.open_path(copy)
         spin(lambda: window.shown.get("angles") is not None and window.shown.track is not None, 1.5)
         spin(lambda: window.bench.frames is not None and window.bench.frames.done)
+        window.table.trigger("run.all")
+        spin(lambda: not window.bench.runner.running and not window.shown.stale("angles"), 1.0)
+        window.messages.clear()
         pictures(window, spin, options.out)
         theme.apply(app, "dark")
         window.redraw()
