@@ -79,6 +79,9 @@ SEARCH = (
     Round(_PLACED, 1.2, 8),
 )
 """On few keyframes: poor starts are dropped early, more of them the clearer it is which are poor."""
+WATCHED = tuple(Round(round_.phase, np.inf, 8) for round_ in SEARCH[:3])
+"""The same where landmarks are seen: they tell the few starts apart that are worth it, but only at the end."""
+_WATCHED_STARTS = 16
 FINE = (
     Phase(0.015, 0.06, 4, reassign=True, free_placement=True),
     Phase(0.01, 0.04, 6, free_placement=True),
@@ -272,12 +275,14 @@ def relax(
         state, surface = start_state(problem, guess, base, camera, skin)
         return Fit(guess, state, surface, problem.energies(state, base, surface), ())
 
-    pool = [begun(guess) for guess in guesses]
+    watched = bool(problem.in_image.any())
+    rounds, fine_phases = (WATCHED, (_PLACED, *FINE)) if watched else (SEARCH, FINE)
+    pool = [begun(guess) for guess in (guesses[:_WATCHED_STARTS] if watched else guesses)]
     say = partial(_tell, progress, guesses)
     left: list[Fit] = []
     best = np.inf
-    for i, round_ in enumerate(SEARCH):
-        progress(0.6 * i / len(SEARCH), f"relaxing {len(pool)} hypotheses")
+    for i, round_ in enumerate(rounds):
+        progress(0.6 * i / len(rounds), f"relaxing {len(pool)} hypotheses")
         judge = phase_weights(base, round_.phase)
         pool = spread(partial(_advance, problem, phases=(round_.phase,), base=base, judge=judge), pool)
         say(pool)
@@ -302,14 +307,14 @@ def relax(
         return _advance(
             whole,
             replace(fit, state=replace(fit.state, pose=pose), refined=True),
-            phases=FINE[:1],
+            phases=fine_phases[:1],
             base=base,
             judge=judge,
         )
 
     fine = _basins(spread(closer_look, chosen))
     say(fine)
-    fine = spread(partial(_advance, whole, phases=FINE[1:], base=base, judge=judge), fine)
+    fine = spread(partial(_advance, whole, phases=fine_phases[1:], base=base, judge=judge), fine)
     fine.sort(key=lambda fit: fit.energies.total)
     say(fine)
     return tuple(fine) + tuple(left[:_SHOWN])

@@ -270,7 +270,9 @@ def test_a_malicious_pickle_does_not_run(tmp_path: Path, name: str, wrapping: st
         path.write_bytes(zlib.compress(pickle.dumps(payload)))
     else:
         pytest.importorskip("torch").save({"a": payload}, path, _use_new_zipfile_serialization=wrapping == "torch")
-    with pytest.raises(InputError, match=name.rpartition(".")[2]) as caught:
+    # A process that has loaded Qt has another function for imports: its name is asked for then.
+    wanted = __import__.__name__ if name == "builtins.__import__" else name.rpartition(".")[2]
+    with pytest.raises(InputError, match=wanted) as caught:
         load_untrusted(path)
     assert str(caught.value).count("\n") == 0
     assert not flag.exists()

@@ -89,7 +89,7 @@ def test_settings_that_cannot_work_are_refused(name: str) -> None:
 
 def test_in_a_short_recording_only_refined_answers_are_compared(free_body: Body) -> None:
     scene = simulate(free_body, 8, frames=10)
-    found = localize(scene.body, scene.seen, np.zeros(36, bool), LocalizeSettings(yaws=4, few=10, many=10, keep=8))
+    found = localize(scene.body, scene.seen, np.zeros(36, bool), LocalizeSettings(yaws=4, few=14, many=10, keep=8))
     assert np.array_equal(found.few, found.many)
     ranked = orient(scene.body, scene.seen, scene.landmarks, found, OrientSettings(refine=2))
     assert 1 <= sum(candidate.refined for candidate in ranked.candidates) <= 2
