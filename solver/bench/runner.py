@@ -97,8 +97,8 @@ def _computed(runs: Sequence[Run], workers: int, work: Work) -> Iterator[dict[st
             try:
                 while queue or flying:
                     while queue and len(flying) < workers:
-                        run = queue.pop()
-                        flying[pool.submit(work, run)] = run
+                        future = pool.submit(work, queue[-1])  # refused where a worker has just died
+                        flying[future] = queue.pop()
                     for future in wait(flying, return_when=FIRST_COMPLETED).done:
                         yield future.result()
                         del flying[future]
