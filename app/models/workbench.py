@@ -26,6 +26,7 @@ from solver.errors import Cancelled, InputError, MarkerscopeError
 from solver.pipeline.run import run_stages
 
 Level = Literal["note", "warning", "error"]
+_LOOK_AGAIN_S = 2.0
 _DRAWN = ("markers", "segment", "fit")
 """Stages whose results the clock and the selection stand on."""
 
@@ -81,6 +82,7 @@ class Workbench:
         self._to_restore: Mapping[str, Any] | None = None
         self._clusters: np.ndarray | None = None
         self._bones: np.ndarray | None = None
+        self._looked = 0.0
         self.document.changed.connect(self._document_changed)
         self.board.changed.connect(self._follow)
         self.runner.failed.connect(self._failed)
@@ -103,7 +105,11 @@ class Workbench:
             self.frames.poll()
         if self._reading is not None and self._reading.done:
             self._read()
-        self.clock.tick(self.now())
+        now = self.now()
+        if self.document.is_open and "markers" not in self._shown and now - self._looked >= _LOOK_AGAIN_S:
+            self._looked = now
+            self._follow()  # a result that could not be loaded when it was asked for
+        self.clock.tick(now)
 
     def attempt(self, act: Callable[[], object]) -> bool:
         """Do something that the user asked for; what cannot be done is said. Returns whether it was done."""
