@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from solver.clean.gap_statistics import heavy_tail, load_gap_statistics
 from solver.errors import InputError
 
 LONGEST = 200
@@ -36,9 +36,8 @@ class GapModel:
 
 
 def heavy_tailed(longest: int = LONGEST) -> GapModel:
-    """Lengths as (l + 0.6)^-1.4, which real statistics follow; every marker lost alike."""
-    weight = (np.arange(1, longest + 1) + 0.6) ** -1.4
-    return GapModel(weight / weight.sum(), np.ones(1))
+    """Lengths as ``heavy_tail`` has them; every marker lost alike."""
+    return GapModel(heavy_tail(longest), np.ones(1))
 
 
 def read_gap_statistics(path: str | Path, longest: int = LONGEST) -> GapModel:
@@ -46,25 +45,19 @@ def read_gap_statistics(path: str | Path, longest: int = LONGEST) -> GapModel:
 
     Parameters
     ----------
-    path : npz with ``missing_arr`` (K, 2), frames lost and frames in all of each marker, and ``gap_arr`` (K, L),
-        how many of its gaps lasted 0..L-1 frames
+    path : see ``load_gap_statistics``
     longest : frames; longer gaps count as this long
 
     Raises
     ------
-    InputError : the file is not such an npz
+    InputError : the file is not such an npz, or counts no gap
     """
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            missing, counts = np.asarray(file["missing_arr"], float), np.asarray(file["gap_arr"], float).sum(axis=0)
-        share = missing[:, 0] / missing[:, 1]
-        number = np.bincount(np.clip(np.arange(len(counts)), 0, longest), counts, longest + 1)[1:]
-        if not (share.mean() > 0 and number.sum() > 0 and (share <= 1).all() and (number >= 0).all()):
-            raise ValueError("counts are impossible")
-    except (OSError, ValueError, KeyError, IndexError, EOFError, zipfile.BadZipFile) as error:
-        remedy = "give an npz with missing_arr (markers, 2) and gap_arr (markers, lengths)"
-        raise InputError("holds no gap statistics", path, remedy) from error
-    return GapModel(number / number.sum(), share / share.mean())
+    real = load_gap_statistics(path)
+    counts = real.lengths.sum(axis=0)
+    number = np.bincount(np.clip(np.arange(len(counts)), 0, longest), counts, longest + 1)[1:]
+    if not (number.any() and real.share.any()):
+        raise InputError("counts no gap", path, "give the statistics of recordings in which markers were lost")
+    return GapModel(number / number.sum(), real.share / real.share.mean())
 
 
 def draw_gaps(present: np.ndarray, model: GapModel, share: float, seed: int) -> np.ndarray:

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from solver.body.model import Body, chain
+from solver.clean.gap_statistics import load_gap_statistics
 from solver.io.motion import SkeletonMotion
 from solver.markers import Markers
 from solver.prior import PosePrior
 from solver.synth.acts import act
 from solver.synth.body import vary_body, vary_bones
 from solver.synth.capture import sliding
-from solver.synth.gaps import gaps_like, heavy_tailed_gaps, hidden_by_chance, load_gap_statistics
+from solver.synth.gaps import gaps_like, heavy_tailed_gaps, hidden_by_chance
 from solver.synth.ghosts import ghosts
 from solver.synth.layouts import named_sites
 from solver.synth.motion import Motion, carried_over, damped, on_floor, played
