@@ -111,7 +111,8 @@ class _Overlay:
         self.markers = np.where(self.seen[..., None], markers, 0.0)
         self.points = points
         self.count = np.maximum(self.seen.sum(axis=1), 1)
-        self.flat = points.transpose(1, 0, 2).reshape(points.shape[1], -1)
+        # Single precision tells the nearest vertex as well, in half the time.
+        self.flat = points.transpose(1, 0, 2).reshape(points.shape[1], -1).astype(np.float32)
         self.own = np.einsum("nvk,nvk->vn", points, points) @ self.seen
         self.total = max(int(self.seen.sum()), 1)
         self.ever = self.seen.any(axis=0)
@@ -138,7 +139,7 @@ class _Overlay:
         """(V, M) m^2 summed over the frames in which the marker is seen."""
         # The markers are carried to the body instead of the body to the markers: nearly all is then known beforehand.
         carried = ((self.markers - trans[:, None]) @ turn) * self.seen[..., None]
-        product = self.flat @ carried.transpose(0, 2, 1).reshape(self.flat.shape[1], -1)
+        product = self.flat @ carried.transpose(0, 2, 1).reshape(self.flat.shape[1], -1).astype(np.float32)
         return self.own - 2 * product + np.einsum("nmk,nmk->m", carried, carried)
 
     def _register(

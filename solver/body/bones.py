@@ -7,6 +7,7 @@ here lengthens one kind of bone, on both sides alike, by a few per cent per unit
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -40,6 +41,7 @@ MODES = (
 """Spreads are a few per cent: what a 10-component shape space leaves of adult segment-length variation."""
 
 
+@lru_cache(maxsize=4)
 def with_bone_lengths(body: Body) -> Body:
     """The same body with the coefficients of ``MODES`` appended to its betas."""
     vertex_modes, joint_modes = zip(*(_mode(body, mode) for mode in MODES), strict=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -67,30 +67,7 @@ class Body:
             from solver.body.adapt import load_smpl
 
             return load_smpl(path)
-        try:
-            raw = EMBEDDED.read_bytes()
-        except OSError as error:
-            raise InputError("the embedded body cannot be read", EMBEDDED, "install Markerscope again") from error
-        with np.load(EMBEDDED, allow_pickle=False) as data:
-            return cls(
-                template=data["v_template"].astype(float),
-                shape_dirs=data["shapedirs"].astype(float),
-                joint_template=data["J_template"].astype(float),
-                joint_dirs=data["J_shapedirs"].astype(float),
-                weights_index=data["weights_index"].astype(np.intp),
-                weights_value=data["weights_value"].astype(float),
-                faces=data["f"].astype(np.intp),
-                lod_index=data["lod_index"].astype(np.intp),
-                lod_faces=data["lod_f"].astype(np.intp),
-                marker_mask=data["marker_mask"].astype(bool),
-                landmark_names=tuple(str(name) for name in data["landmark_names"]),
-                landmark_vertices=data["landmark_vertices"].astype(np.intp),
-                landmark_values=data["landmark_values"].astype(float),
-                landmark_joint=data["landmark_joint"].astype(np.intp),
-                betas_count=data["shapedirs"].shape[2],
-                name="embedded",
-                digest=hashlib.sha256(raw).hexdigest()[:16],
-            )
+        return _embedded()
 
     @property
     def shape_count(self) -> int:
@@ -103,6 +80,17 @@ class Body:
         dense = np.zeros((len(self.template), len(JOINTS)))
         np.put_along_axis(dense, self.weights_index, self.weights_value, axis=1)
         return dense
+
+    @cached_property
+    def faces_around(self) -> np.ndarray:
+        """(V, K) the faces that meet in each vertex; -1 where they are fewer."""
+        corner, face = self.faces.ravel(), np.repeat(np.arange(len(self.faces)), 3)
+        order = np.argsort(corner, kind="stable")
+        count = np.bincount(corner, minlength=len(self.template))
+        rank = np.arange(len(corner)) - np.repeat(np.cumsum(count) - count, count)
+        around = np.full((len(count), count.max()), -1)
+        around[corner[order], rank] = face[order]
+        return around
 
     def joints(self, betas: np.ndarray) -> np.ndarray:
         """(24, 3) m joint centres of the shaped body at rest."""
@@ -191,8 +179,43 @@ class Body:
 
             names = ("template", "shape_dirs", "joint_template", "joint_dirs", "weights", "pose_dirs")
             values = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
-            self._torch[key] = {k: torch.as_tensor(v, dtype=like.dtype, device=like.device) for k, v in values.items()}
+            self._torch[key] = {k: torch.tensor(v, dtype=like.dtype, device=like.device) for k, v in values.items()}
         return self._torch[key]
+
+
+@cache
+def _embedded() -> Body:
+    """Read once; every user shares its arrays, which therefore cannot be written to."""
+    try:
+        raw = EMBEDDED.read_bytes()
+    except OSError as error:
+        raise InputError("the embedded body cannot be read", EMBEDDED, "install Markerscope again") from error
+    with np.load(EMBEDDED, allow_pickle=False) as data:
+        numbers = {
+            "template": data["v_template"].astype(float),
+            "shape_dirs": data["shapedirs"].astype(float),
+            "joint_template": data["J_template"].astype(float),
+            "joint_dirs": data["J_shapedirs"].astype(float),
+            "weights_index": data["weights_index"].astype(np.intp),
+            "weights_value": data["weights_value"].astype(float),
+            "faces": data["f"].astype(np.intp),
+            "lod_index": data["lod_index"].astype(np.intp),
+            "lod_faces": data["lod_f"].astype(np.intp),
+            "marker_mask": data["marker_mask"].astype(bool),
+            "landmark_vertices": data["landmark_vertices"].astype(np.intp),
+            "landmark_values": data["landmark_values"].astype(float),
+            "landmark_joint": data["landmark_joint"].astype(np.intp),
+        }
+        names = tuple(str(name) for name in data["landmark_names"])
+    for array in numbers.values():
+        array.setflags(write=False)
+    return Body(
+        **numbers,
+        landmark_names=names,
+        betas_count=numbers["shape_dirs"].shape[2],
+        name="embedded",
+        digest=hashlib.sha256(raw).hexdigest()[:16],
+    )
 
 
 def chain(rotations: Any, rest_joints: Any, trans: Any) -> tuple[Any, Any]:
@@ -209,12 +232,20 @@ def chain(rotations: Any, rest_joints: Any, trans: Any) -> tuple[Any, Any]:
 
 def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(V, 3) area-weighted outward unit normals of one mesh (V, 3)."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    face = np.cross(b - a, c - a)
-    total = np.zeros_like(vertices)
-    for k in range(3):
-        for axis in range(3):
-            total[:, axis] += np.bincount(faces[:, k], face[:, axis], minlength=len(vertices))
+    a, b, c = vertices.T[:, faces.T].swapaxes(0, 1)
+    u, v = b - a, c - a
+    face = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+    corners = faces.ravel()
+    total = np.stack([np.bincount(corners, np.repeat(one, 3), minlength=len(vertices)) for one in face], axis=1)
+    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
+
+
+def normals_at(vertices: np.ndarray, faces: np.ndarray, around: np.ndarray) -> np.ndarray:
+    """(n, 3) the same at some vertices of the mesh, whose faces ``around`` (n, K) lists; -1 = none."""
+    wanted, place = np.unique(around, return_inverse=True)
+    a, b, c = vertices[faces[wanted]].swapaxes(0, 1)
+    face = np.cross(b - a, c - a) * (wanted >= 0)[:, None]
+    total = face[place.reshape(around.shape)].sum(axis=1)
     return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
 
 

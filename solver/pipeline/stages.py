@@ -115,7 +115,7 @@ GRAPH = (
     ),
     Stage(
         "fit",
-        2,
+        3,
         FitSettings,
         (*FITTED_TO, "localize", "orient"),
         fitting.fit_every_frame,

@@ -218,7 +218,7 @@ def reassign(problem: Problem, state: State, weights: Weights) -> tuple[State, S
     skin = Skin(body, betas)
     index = np.intersect1d(body.lod_index, skin.index)
     candidates = Points(
-        skin.surface[index] + weights.offset * skin.normal[index] - body.shape_dirs[index] @ betas,
+        skin.surface[index] + weights.offset * skin.normal(index) - body.shape_dirs[index] @ betas,
         body.shape_dirs[index],
         body.weights[index],
     )
@@ -236,7 +236,7 @@ def reassign(problem: Problem, state: State, weights: Weights) -> tuple[State, S
     residual = problem.target - placed[:, best]
     carried = np.einsum("nmji,nmj->nmi", turn, residual) * problem.present[..., None]
     offset = np.clip(carried.sum(axis=0) / count[:, None], -0.03, 0.03)
-    normal = skin.normal[index[best]]
+    normal = skin.normal(index[best])
     offset -= np.einsum("mk,mk->m", offset, normal)[:, None] * normal
     placement, surface = skin.attach(chosen.shaped(betas) + offset)
     return replace(state, placement=placement), surface

@@ -258,14 +258,13 @@ def fit(
     used = replace(seen, markers=seen.markers[:, found.markers])
     frames = found.many if chosen.refined else found.few
     state, surface, weights = _settled(body, used.at(frames), landmarks, chosen, settings)
-    placement = state.placement
     pose = every_frame(body, used, landmarks, frames, state, surface, weights, progress)
     links = forward(body, pose)
     count = seen.markers.shape[1]
     placed = np.full((len(time), count, 3), np.nan)
-    placed[:, found.markers] = place_points(placement, links, pose.betas)
+    placed[:, found.markers] = place_points(state.placement, links, pose.betas)
     joint, vertex = np.full(count, -1), np.full(count, -1)
-    joint[found.markers], vertex[found.markers] = chosen.bone, chosen.vertex
+    joint[found.markers], vertex[found.markers] = _sites(body, state)
     pinned = settings.candidate is not None
     return FittedMotion(
         time=time,
@@ -277,7 +276,7 @@ def fit(
         marker_vertex=vertex,
         placed=placed,
         residual=np.linalg.norm(seen.markers - placed, axis=2),
-        camera=chosen.camera,
+        camera=_written(state.camera, chosen.camera.image_size, chosen.camera.reprojection_px),
         chosen=row,
         confidence=1.0 if pinned else ranked.confidence,
         warnings=(f"Candidate {row} was pinned by hand.",) if pinned else ranked.warnings,
@@ -316,6 +315,18 @@ def _camera_of(camera: CameraResult, centre: np.ndarray) -> Camera:
     return Camera(camera.R_lab_cam, (centre - camera.position) @ camera.R_lab_cam, centre, camera.focal)
 
 
+def _written(camera: Camera, image_size: tuple[int, int], reprojection_px: float) -> CameraResult:
+    """The camera as results carry it: where it stands in the lab."""
+    position = camera.centre - camera.R_lab_cam @ camera.shift
+    return CameraResult(camera.R_lab_cam, position, camera.focal, image_size, reprojection_px)
+
+
+def _sites(body: Body, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """The bone of each marker and its nearest vertex, (U,) each."""
+    placement, betas = state.placement, state.pose.betas
+    return placement.weights.argmax(axis=1), Skin(body, betas).nearest_vertex(placement.shaped(betas))
+
+
 def _steps(poses: tuple[Pose, ...], few: np.ndarray, many: np.ndarray) -> Steps | None:
     """Poses after each step, solved on the few or on the many keyframes, in the few that they have in common."""
     if not poses:
@@ -328,25 +339,20 @@ def _steps(poses: tuple[Pose, ...], few: np.ndarray, many: np.ndarray) -> Steps 
 
 
 def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem, steps: Steps | None) -> Candidate:
-    state, camera = fitted.state, fitted.state.camera
-    bone = state.placement.weights.argmax(axis=1)
-    view = camera.R_lab_cam[:, 2]
+    state = fitted.state
+    bone, vertex = _sites(body, state)
+    view = state.camera.R_lab_cam[:, 2]
+    reprojection = whole.reprojection(state) if fitted.refined else float("nan")
     return Candidate(
         hypothesis=hypothesis,
         refined=fitted.refined,
         energies=asdict(fitted.energies),
         energy=fitted.energies.total,
         bone=bone,
-        vertex=Skin(body, state.pose.betas).nearest_vertex(state.placement.shaped(state.pose.betas)),
+        vertex=vertex,
         part=part_name(bone),
         heading_deg=float(np.degrees(np.arctan2(view[1], view[0]))),
-        camera=CameraResult(
-            camera.R_lab_cam,
-            camera.centre - camera.R_lab_cam @ camera.shift,
-            camera.focal,
-            whole.seen.image_size,
-            whole.reprojection(state) if fitted.refined else float("nan"),
-        ),
+        camera=_written(state.camera, whole.seen.image_size, reprojection),
         rest=state.placement.rest,
         dirs=state.placement.dirs,
         weights=state.placement.weights,

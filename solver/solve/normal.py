@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy.linalg.blas import dtrsm
 from scipy.linalg.lapack import dtrtrs
 
 from solver.body.skeleton import INDEX, descendants
@@ -113,14 +114,16 @@ class NormalEquations:
         # With L L^T = h_ff, everything that the frames say of the shared unknowns is one product of L^-1 [h_fs, g_f].
         frames, size = self.g_f.shape
         lower = np.linalg.cholesky(self.h_ff)
-        rows = np.empty((frames, len(free) + 1, size))
-        rows[:, :-1] = self.h_fs[:, :, free].swapaxes(1, 2)
-        rows[:, -1] = self.g_f
+        rows = np.empty((frames, size, len(free) + 1))
+        rows[..., :-1] = self.h_fs[..., free]
+        rows[..., -1] = self.g_f
         for of_frame, factor in zip(rows, lower, strict=True):
-            of_frame[:] = dtrtrs(factor.T, of_frame.T, lower=0, trans=1)[0].T
-        product = (rows @ rows.swapaxes(1, 2)).sum(axis=0)
+            # LAPACK counts by columns, so it sees both transposed; it then works in place, without a copy.
+            dtrsm(1.0, factor.T, of_frame.T, side=1, lower=0, overwrite_b=1)
+        flat = rows.reshape(frames * size, -1)
+        product = flat.T @ flat
         shared[free] = -np.linalg.solve(h_ss - product[:-1, :-1], self.g_s[free] - product[:-1, -1])
-        known = rows[:, -1] + np.einsum("fks,k->fs", rows[:, :-1], shared[free])
+        known = rows[..., -1] + rows[..., :-1] @ shared[free]
         step = [dtrtrs(factor.T, one, lower=0, trans=0)[0] for factor, one in zip(lower, known, strict=True)]
         return -np.stack(step), shared
 

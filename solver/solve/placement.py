@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solver.body.model import Body, vertex_normals
+from solver.body.model import Body, normals_at
 from solver.solve.kinematics import Points
 from solver.solve.state import Surface
 
@@ -28,18 +28,24 @@ class Skin:
         self.body, self.betas = body, betas
         self.index = np.flatnonzero(body.marker_mask)
         self.surface = body.surface(betas)
-        self.normal = vertex_normals(self.surface, body.faces)
 
     @cached_property
     def _tree(self) -> cKDTree:
-        return cKDTree(self.surface[self.index])
+        # Asked some forty times each, so that a balanced tree would cost more than it saves.
+        return cKDTree(self.surface[self.index], balanced_tree=False, compact_nodes=False)
+
+    def normal(self, vertices: np.ndarray) -> np.ndarray:
+        """(..., 3) outward unit normals at given vertices; a fit asks for few of all."""
+        flat = normals_at(self.surface, self.body.faces, self.body.faces_around[vertices.ravel()])
+        return flat.reshape(*vertices.shape, 3)
 
     def on_vertices(self, vertices: np.ndarray, height: float) -> tuple[Points, Surface]:
         """Markers (M) set ``height`` m above given vertices."""
-        placed = self.surface[vertices] + height * self.normal[vertices]
+        normal = self.normal(vertices)
+        placed = self.surface[vertices] + height * normal
         rest = placed - self.body.shape_dirs[vertices] @ self.betas
         points = Points(rest, self.body.shape_dirs[vertices], self.body.weights[vertices])
-        return points, Surface(self.surface[vertices], self.normal[vertices])
+        return points, Surface(self.surface[vertices], normal)
 
     def attach(self, placed: np.ndarray) -> tuple[Points, Surface]:
         """Markers at ``placed`` (M, 3) m on the shaped rest body, riding on the skin below them."""
@@ -47,15 +53,15 @@ class Skin:
         share = 1 / np.maximum(distance, 1e-4) ** 2
         share /= share.sum(axis=1, keepdims=True)
         near = self.index[near]
-        blend = lambda values: np.einsum("mk,mk...->m...", share, values[near])  # noqa: E731
-        dirs = blend(self.body.shape_dirs)
-        normal = blend(self.normal)
+        blend = lambda values: np.einsum("mk,mk...->m...", share, values)  # noqa: E731
+        dirs = blend(self.body.shape_dirs[near])
+        normal = blend(self.normal(near))
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
-        weights = blend(self.body.weights)
+        weights = blend(self.body.weights[near])
         # Traces of far bones would make every marker depend on many joints and tell nothing.
         weights[weights < _NEGLIGIBLE] = 0
         weights /= weights.sum(axis=1, keepdims=True)
-        return Points(placed - dirs @ self.betas, dirs, weights), Surface(blend(self.surface), normal)
+        return Points(placed - dirs @ self.betas, dirs, weights), Surface(blend(self.surface[near]), normal)
 
     def nearest_vertex(self, placed: np.ndarray) -> np.ndarray:
         """(M,) vertex index below each marker."""

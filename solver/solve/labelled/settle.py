@@ -37,7 +37,7 @@ def settle(problem: Problem, state: State, surface: Surface, places: Places, wei
         best = int((np.einsum("nvk,nvk->nv", gap, gap) * seen[:, None]).sum(0).argmin())
         turn = blended_turn(points.take(np.array([best])), links)[:, 0]
         carried = np.einsum("nji,nj->ni", turn, gap[:, best])[seen].mean(0).clip(-_REACH_M, _REACH_M)
-        normal = skin.normal[own[best]]
+        normal = skin.normal(own[best])
         placed[i] = points.shaped(betas)[best] + carried - (carried @ normal) * normal
     moved, below = skin.attach(placed)
     known = places.vertex >= 0
