@@ -102,7 +102,7 @@ def settings_of(stage: str, settings: Any, decided: frozenset[str] = frozenset()
     decided : names of those decided by hand
     """
     cls: type = type(settings)
-    hints, texts, default = typing.get_type_hints(cls), _descriptions(cls), cls()
+    hints, texts, default = _hints(cls), _descriptions(cls), cls()
     found = []
     for field in dataclasses.fields(cls):
         kind, choices, optional = _kind(hints[field.name])
@@ -144,6 +144,11 @@ def setting_of(stage: str, settings: Any, name: str) -> Setting:
 def descriptions(cls: type) -> dict[str, str]:
     """What a dataclass's docstring, and those of the classes it extends, say of each of its fields."""
     return _descriptions(cls)
+
+
+@cache
+def _hints(cls: Hashable) -> dict[str, Any]:
+    return typing.get_type_hints(cls)
 
 
 @cache

@@ -13,7 +13,7 @@ from app.models.edits import Edit, decided
 from app.models.fields import TITLES, Setting, settings_of, title
 from app.models.lineage import go_back, lineage_of, said_difference
 from app.models.regroup import regrouped
-from app.models.results import Ref, Results, StageResults, written
+from app.models.results import Ref, Results, StageResults
 from app.models.signal import Signal
 from solver.errors import InputError
 from solver.pipeline.methods import graph_of
@@ -121,6 +121,7 @@ class StageBoard:
         self.graph: tuple[Stage, ...] = ()
         self._running: Ref | None = None
         self._failures: dict[Ref, Failure] = {}
+        self._said: dict[Ref, str] = {}  # how each earlier result's settings differ, while the settings stay
         document.changed.connect(self._follow)
         if document.is_open:
             self._follow(True)
@@ -236,6 +237,7 @@ class StageBoard:
         self.changed.emit()
 
     def _derive(self, session: Session) -> None:
+        self._said.clear()
         self.graph = graph_of(session)
         self.settings = session.stage_settings(self.graph)
         self.sources, self.problem = known_sources(session)
@@ -245,13 +247,14 @@ class StageBoard:
 
     def _earlier(self, stage: str, entry: Entry) -> Earlier:
         current = entry.key == self.keys[stage]
-        said = ""
-        if not current:
+        ref = Ref(stage, entry.key)
+        said = "" if current else self._said.get(ref)
+        if said is None:
             past = lineage_of(self.results, stage, entry.key)
-            said = said_difference(past, self.graph, stage, self.settings, self.sources)
-        when = time.strftime("%Y-%m-%d %H:%M", time.localtime(written(entry)))
+            said = self._said[ref] = said_difference(past, self.graph, stage, self.settings, self.sources)
+        when = time.strftime("%Y-%m-%d %H:%M", time.localtime(self.results.written(entry)))
         headline = str(entry.about.get("headline", ""))
-        return Earlier(entry.key, said, when, headline, current, Ref(stage, entry.key) in self.compared)
+        return Earlier(entry.key, said, when, headline, current, ref in self.compared)
 
 
 def known_sources(session: Session) -> tuple[dict[str, Source], InputError | None]:

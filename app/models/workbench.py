@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -15,15 +15,18 @@ from app.models.clock import Clock, Timing
 from app.models.display import Display
 from app.models.document import Document
 from app.models.edits import Edit
+from app.models.fields import title
 from app.models.frames import VideoFrames
 from app.models.home import Home
 from app.models.jobs import Runner
-from app.models.results import Ref
+from app.models.reading import Reading
+from app.models.results import Ref, Unread
 from app.models.selection import Selection
 from app.models.signal import Signal
 from app.models.stages import Failure, StageBoard
+from app.models.view_state import restore_view, view_of
 from solver.errors import Cancelled, InputError, MarkerscopeError
-from solver.pipeline.run import run_stages
+from solver.pipeline.store import Absent
 
 Level = Literal["note", "warning", "error"]
 _LOOK_AGAIN_S = 2.0
@@ -77,7 +80,7 @@ class Workbench:
         self.said: Signal[[Said]] = Signal()
         self.video_changed: Signal[[]] = Signal()
         self.opened: Signal[[]] = Signal()
-        self._reading: _Reading | None = None
+        self._reading: Reading | None = None
         self._shown: dict[str, str] = {}
         self._to_restore: Mapping[str, Any] | None = None
         self._clusters: np.ndarray | None = None
@@ -147,15 +150,7 @@ class Workbench:
     def remember(self, **parts: Any) -> None:
         """Write down how the window looks, so that it opens as it was: the parts given, and what the models know."""
         if self.document.is_open and self._to_restore is None:
-            self.document.set_view(
-                time=self.clock.time,
-                speed=self.clock.speed,
-                loop=self.clock.loop,
-                selection=self.selection.state(),
-                display=self.display.state(),
-                compared=sorted([ref.stage, ref.key] for ref in self.board.compared),
-                **parts,
-            )
+            self.document.set_view(**view_of(self), **parts)
 
     def close(self, keep_untitled: bool = False) -> None:
         """Close the session; what runs is stopped, what was not saved is given up."""
@@ -185,6 +180,8 @@ class Workbench:
         """Have clock and selection stand on the results there are; those not in memory come later."""
         if not self.document.is_open:
             return
+        self.board.results.loaded.connect(self._loaded)
+        self.board.results.failed.connect(self._unread)
         if "markers" in self.board.keys and not self.runner.running:
             self._begin_reading()
         self._follow_sync()
@@ -193,10 +190,10 @@ class Workbench:
             if latest is None or self._shown.get(stage) == latest[0]:
                 continue
             if stage == "segment" or self.board.results.is_loaded(stage, latest[0]):
-                self._show(stage, latest[0])
-            else:
-                self.board.results.loaded.connect(self._loaded)
-                self.board.results.load_ahead(stage, latest[0])
+                with suppress(Absent):
+                    self._show(stage, latest[0])
+                    continue
+            self.board.results.load_ahead(stage, latest[0])
 
     def _follow_sync(self) -> None:
         """Lay the video as the user said, at once; else as it was found last."""
@@ -205,7 +202,11 @@ class Workbench:
         if settings is not None and settings.offset is not None:
             self.clock.set_sync(settings.offset, settings.rate_ratio or 1.0)
         elif latest is not None:
-            found = self.board.results.get("sync", latest[0])
+            try:
+                found = self.board.results.get("sync", latest[0])
+            except Absent:
+                self.board.results.load_ahead("sync", latest[0])  # tries again, and tells if that is in vain
+                return
             self.clock.set_sync(found.offset, found.rate_ratio)
 
     def _loaded(self, ref: Ref) -> None:
@@ -213,9 +214,16 @@ class Workbench:
         if latest is not None and latest[0] == ref.key and self._shown.get(ref.stage) != ref.key:
             self._show(ref.stage, ref.key)
 
+    def _unread(self, found: Unread) -> None:
+        """Say that a result cannot be had; it is no more in force if it was damaged."""
+        remedy = "run the stage again" if found.gone else "see that the disk is at hand; it is tried again by itself"
+        self.say(Said("error", f"A result cannot be shown, for {found.why}", title(found.ref.stage), remedy))
+        if found.gone:
+            self.board.changed.emit()
+
     def _show(self, stage: str, key: str) -> None:
-        self._shown[stage] = key
         value = self.board.results.get(stage, key)
+        self._shown[stage] = key
         if stage == "markers":
             frames = len(value.positions)
             self.clock.set_timing(replace(self.clock.timing, first=value.first_time, rate=value.rate, frames=frames))
@@ -229,28 +237,13 @@ class Workbench:
     def _restore(self) -> None:
         """Have it as it was left, once it is known how long the recording is."""
         view, self._to_restore = self._to_restore, None
-        if not view:
-            return
-        loop, speed, at = view.get("loop"), view.get("speed"), view.get("time")
-        if isinstance(speed, int | float):
-            self.clock.set_speed(speed)
-        if isinstance(loop, list | tuple) and len(loop) == 2 and all(isinstance(end, int | float) for end in loop):
-            self.clock.set_loop((float(loop[0]), float(loop[1])))
-        if isinstance(at, int | float):
-            self.clock.seek(float(at))
-        for name, model in (("selection", self.selection), ("display", self.display)):
-            state = view.get(name)
-            if isinstance(state, Mapping):
-                model.restore(state)
-        compared = view.get("compared")
-        for row in compared if isinstance(compared, list) else ():
-            if isinstance(row, list) and len(row) == 2 and all(isinstance(part, str) for part in row):
-                self.board.compare(row[0], row[1], True)
+        if view:
+            restore_view(self, view)
 
     def _begin_reading(self) -> None:
         """Read the markers as soon as they are others, so that there is something to look at before anything is run."""
         if self._reading is None and self.board.state("markers") in ("not run", "stale"):
-            self._reading = _Reading(self.document.session, self.board.keys["markers"])
+            self._reading = Reading(self.document.session, self.board.keys["markers"])
 
     def _read(self) -> None:
         reading, self._reading = self._reading, None
@@ -295,23 +288,3 @@ class Workbench:
 
     def _failed(self, failure: Failure) -> None:
         self.say(Said("error", failure.what, failure.where, failure.remedy))
-
-
-class _Reading:
-    """The marker file being read in a thread."""
-
-    def __init__(self, session: Any, key: str) -> None:
-        self.key = key
-        self.error: Exception | None = None
-        self._thread = threading.Thread(target=self._run, args=(session,), name="markers", daemon=True)
-        self._thread.start()
-
-    @property
-    def done(self) -> bool:
-        return not self._thread.is_alive()
-
-    def _run(self, session: Any) -> None:
-        try:
-            run_stages(session, ["markers"])
-        except Exception as error:
-            self.error = error

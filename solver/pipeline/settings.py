@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import types
 import typing
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Hashable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -38,7 +39,7 @@ def from_table(cls: type, table: Mapping[str, Any], where: str = "settings") -> 
     ------
     InputError : a name or a value that the settings do not know
     """
-    hints = typing.get_type_hints(cls)
+    hints = _hints(cls)
     fields = {field.name for field in dataclasses.fields(cls)}
     values: dict[str, Any] = dict.fromkeys(_names(table.get(UNSET, []), where))
     values |= {name: value for name, value in table.items() if name != UNSET}
@@ -64,6 +65,11 @@ def without(table: Mapping[str, Any], names: Collection[str]) -> dict[str, Any]:
     kept = {name: value for name, value in table.items() if name not in (UNSET, *names)}
     unset = [name for name in table.get(UNSET, ()) if name not in names]
     return kept | ({UNSET: unset} if unset else {})
+
+
+@cache
+def _hints(cls: Hashable) -> dict[str, Any]:
+    return typing.get_type_hints(cls)
 
 
 def _names(value: Any, where: str) -> list[str]:

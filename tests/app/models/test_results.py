@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import shutil
 import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from app.models.results import Ref, Results
+from app.models.results import Ref, Results, Unread
 from solver.pipeline.methods import GRAPHS, result_type
 from solver.pipeline.run import keys_of
 from solver.pipeline.session import Session
@@ -70,6 +71,51 @@ def test_loading_ahead_tells_the_thread_that_polls(store: Store) -> None:
     assert told == [(Ref("sync", "key1"), threading.current_thread())]
     assert results.is_loaded("sync", "key1")
     results.close()
+
+
+def until(results: Results, told: list[object]) -> None:
+    """Poll until something has been told."""
+    end = time.monotonic() + 30
+    while not told:
+        assert time.monotonic() < end, "nothing was told"
+        results.poll()
+        time.sleep(0.005)
+
+
+def test_a_damaged_result_is_told_of_once_and_taken_out(store: Store) -> None:
+    path = store.folder("sync", "key1") / "arrays.npz"
+    path.write_bytes(bytes(path.stat().st_size))
+    results, told = Results(store), list[Unread]()
+    results.failed.connect(told.append)
+    assert results.has("sync", "key1"), "its size and manifest say nothing of the damage"
+    results.load_ahead("sync", "key1")
+    until(results, told)
+    assert told == [Unread(Ref("sync", "key1"), "its file is damaged", True)]
+    assert not results.has("sync", "key1") and not store.has("sync", "key1")
+    store.put("sync", "key1", a_sync(9.0))
+    assert results.get("sync", "key1").offset == 9.0
+
+
+def test_a_result_that_cannot_be_read_for_a_while_is_tried_again(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    refuses = [True]
+
+    def get(self: Store, stage: str, key: str, *types: object) -> Sync:
+        if refuses[0]:
+            raise Absent(stage, key) from OSError(5, "Input/output error")
+        return a_sync(7.0)
+
+    monkeypatch.setattr(Store, "get", get)
+    results, failed, loaded = Results(store), list[Unread](), list[Ref]()
+    results.failed.connect(failed.append)
+    results.loaded.connect(loaded.append)
+    results.load_ahead("sync", "key2")
+    until(results, failed)
+    assert failed == [Unread(Ref("sync", "key2"), "it cannot be read: Input/output error", False)]
+    assert store.has("sync", "key2"), "nothing says that it is damaged"
+    refuses[0] = False
+    until(results, loaded)
+    assert loaded == [Ref("sync", "key2")] and len(failed) == 1
+    assert results.get("sync", "key2").offset == 7.0
 
 
 def test_entries_are_the_newest_first_and_follow_the_store(store: Store) -> None:
