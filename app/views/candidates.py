@@ -29,6 +29,14 @@ FATES: dict[Fate, str] = {
     "refined": "refined to the end",
 }
 
+ENERGY, CHAMFER = ("Energy", "per frame"), ("Chamfer", "mm²")
+"""What each method ranks the candidates by, and its unit."""
+MEANING = {
+    "Energy": "Energy per frame by which the answers are ranked, the least first; only those of one state compare",
+    "Chamfer": "Mean squared distance between markers and skin, both ways (of solved yaws from the markers alone)",
+}
+"""What the scores mean."""
+
 
 @dataclass(frozen=True)
 class CandidateRow:
@@ -86,12 +94,14 @@ class CandidateTable:
     rows : best first
     steps : from the pool to the refined
     score, unit : what the candidates are ranked by
+    meaning : of the score, one sentence
     """
 
     rows: tuple[CandidateRow, ...]
     steps: tuple[Step, ...]
     score: str
     unit: str
+    meaning: str = ""
 
 
 def candidate_table(
@@ -111,10 +121,10 @@ def candidate_table(
     """
     if isinstance(found, PaperLocalization):
         rows, steps = _of_chains(found, ranked)
-        score, unit = "two-way Chamfer distance; yaws: one-way", "mm²"
+        score, unit = CHAMFER
     else:
         rows, steps = _of_hypotheses(found, ranked)
-        score, unit = "energy per frame", ""
+        score, unit = ENERGY
     covered = covered or {}
     marked = tuple(
         replace(row, in_use=row.candidate == in_use, covered=covered.get(row.candidate, float("nan")))
@@ -122,7 +132,7 @@ def candidate_table(
         else row
         for row in rows
     )
-    return CandidateTable(marked, steps, score, unit)
+    return CandidateTable(marked, steps, score, unit, MEANING[score])
 
 
 def coverage(points: np.ndarray, markers: np.ndarray, within: float = 0.03) -> float:

@@ -12,6 +12,8 @@ from solver.solve.results import Candidate, Orientation
 from widgets import palette
 
 _CHAINS_SHOWN = 5
+TO_THE_END = "all phases"
+"""What the stage of the default method's curves that were not left behind is called."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,7 @@ def of_orientation(ranked: Orientation) -> tuple[EnergyCurve, ...]:
     colours = palette.categorical(len(ranked.candidates))
     return tuple(
         EnergyCurve(
-            stage="all phases" if own.refined else "first phases, then left behind",
+            stage=TO_THE_END if own.refined else "first phases, then left behind",
             label=f"{i + 1}: {own.part}, heading {own.heading_deg:.0f}°",
             candidate=i,
             iteration=1 + np.arange(len(own.trace)),

@@ -7,7 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.views.candidates import CandidateRow, CandidateTable, Step, bone_names, candidate_table, part_of_bones
+from app.views.candidates import (
+    CHAMFER,
+    MEANING,
+    CandidateRow,
+    CandidateTable,
+    Step,
+    bone_names,
+    candidate_table,
+    part_of_bones,
+)
 from app.views.colours import rgb
 from app.views.convergence import EnergyCurve
 from solver.progress import Found
@@ -31,7 +40,7 @@ def candidates_so_far(notes: Sequence[Found], found: Localization | None = None)
         rows = sorted((_of_chain(note) for note in chains), key=lambda row: row.score)
         wanted = int(chains[0].values["of"])
         step = Step("Scored", f"{len(chains)} of {wanted} chains laid over the markers so far.", _all(rows))
-        return CandidateTable(_with_margin(rows), (step,), "two-way Chamfer distance", "mm²")
+        return CandidateTable(_with_margin(rows), (step,), *CHAMFER, MEANING[CHAMFER[0]])
     ranked = {index: note for (kind, index), note in latest.items() if kind == "candidate"}
     if not ranked or found is None:
         return None
@@ -45,7 +54,7 @@ def candidates_so_far(notes: Sequence[Found], found: Localization | None = None)
         replace(plain.steps[1], rows=scored),
         replace(plain.steps[3], rows=refined),
     )
-    return CandidateTable(_with_margin(rows), steps, plain.score, plain.unit)
+    return CandidateTable(_with_margin(rows), steps, plain.score, plain.unit, plain.meaning)
 
 
 def curves_so_far(notes: Sequence[Found]) -> tuple[EnergyCurve, ...]:

@@ -50,7 +50,7 @@ class CandidatesBinder:
         inks = palette.categorical(12)
         of_ghost = [max(row.pool if row.candidate < 0 else row.candidate, 0) % 12 for row in rows]
         colours = inks[of_ghost] if rows else None
-        self.widget.set_rows(rows, place, table.score, table.unit, colours)
+        self.widget.set_rows(rows, place, table.score, table.unit, colours, table.meaning)
         self.widget.set_steps(table.steps, self._step)
         self._select()
 

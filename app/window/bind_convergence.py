@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.models.workbench import Workbench
-from app.views.convergence import EnergyCurve, of_orientation, of_paper
+from app.views.convergence import TO_THE_END, EnergyCurve, of_orientation, of_paper
 from app.views.running import curves_so_far
 from app.window.ghosts import Ghosts
 from app.window.shown import Shown
@@ -30,7 +30,7 @@ class ConvergenceBinder:
         curves = so_far or self._results()
         if len(curves) != len(self.curves) or any(a is not b for a, b in zip(curves, self.curves)):
             self.curves = curves
-            self.widget.set_curves(curves)
+            self.widget.set_curves(curves, TO_THE_END)
 
     def _results(self) -> tuple[EnergyCurve, ...]:
         found, ranked, solved = (self.shown.get(name) for name in ("localize", "orient", "solve"))

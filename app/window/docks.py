@@ -69,7 +69,7 @@ class Docks:
         width, height = self.window.width(), self.window.height()
         sides = [self.docks["stages"], self.docks["video"]]
         self.window.resizeDocks(sides, [int(0.23 * width), int(0.35 * width)], Qt.Orientation.Horizontal)
-        self.window.resizeDocks([self.docks["timelines"]], [int(0.33 * height)], Qt.Orientation.Vertical)
+        self.window.resizeDocks([self.docks["timelines"]], [int(0.36 * height)], Qt.Orientation.Vertical)
         stack = [self.docks["video"], self.docks["affinity"]]
         self.window.resizeDocks(stack, [int(0.24 * height), int(0.4 * height)], Qt.Orientation.Vertical)
 

@@ -188,3 +188,15 @@ def test_what_is_left_is_no_more_exact_than_it_is_known() -> None:
     assert [left(s) for s in (0.2, 4.4, 38, 130)] == [
         "about 1 s left", "about 4 s left", "about 40 s left", "about 2 min left",
     ]  # fmt: skip
+
+
+def test_a_card_is_never_wider_than_the_panel(panel: StagePanel, qapp: QApplication) -> None:
+    for stage in STAGES:
+        panel.card(stage.name).set_open(True)
+    qapp.processEvents()
+    panel.resize(panel.minimumSizeHint())
+    qapp.processEvents()
+    for stage in STAGES:
+        card = panel.card(stage.name)
+        right = card.mapTo(panel, card.rect().topRight()).x()
+        assert right < panel.viewport().width(), f"{stage.name} goes on beyond the panel's edge"

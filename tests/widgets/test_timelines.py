@@ -17,7 +17,7 @@ from tests.widgets.drawn import pixels
 from widgets import palette, theme
 from widgets.plots.decimate import Counts, envelope, shown_frames
 from widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
-from widgets.plots.scales import Scale, clock, number, ticks, time_ticks
+from widgets.plots.scales import Scale, clock, log_ticks, number, ticks, time_ticks
 from widgets.plots.timelines import Timelines
 
 TIME = np.arange(1000) / 100.0
@@ -293,3 +293,17 @@ def test_strips_in_another_order_are_told_by_their_markers(qapp: QApplication) -
     changed = np.flatnonzero((np.abs(pixels(made.rows).astype(int) - before).max(axis=2) > 30).any(axis=1))
     assert changed.max() <= made.rows.area_of("Markers").top() + made.rows.area_of("Markers").height() / 3 + 2
     made.close()
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "most"), [(126, 144, 4), (0.5, 250, 2), (0.5, 250, 6), (1e-3, 2e-3, 3), (1, 1e6, 3)]
+)
+def test_a_logarithmic_axis_has_two_numbers_at_least(low: float, high: float, most: int) -> None:
+    found = log_ticks(low, high, most)
+    assert 2 <= len(found) <= most + 1, found
+    assert all(low * (1 - 1e-9) <= value <= high * (1 + 1e-9) for value in found)
+
+
+@given(st.floats(0.01, 1e4), st.floats(20, 400), st.floats(10, 60))
+def test_an_axis_has_two_numbers_however_low_it_is(high: float, tall: float, apart: float) -> None:
+    assert len(Scale(0, high, tall, 0).ticks(apart)) >= 2

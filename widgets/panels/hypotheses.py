@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QFont, QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPalette, QPixmap
+from PySide6.QtGui import QFont, QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPalette, QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QFrame,
     QHBoxLayout,
     QLabel,
@@ -73,21 +74,10 @@ class HypothesisCard(QFrame):
         self.card = card
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setFrameShape(QFrame.Shape.StyledPanel)
-        line = self.fontMetrics().height()
-        self.setFixedWidth(round(15 * line))
         self._chosen = False
-        image = QLabel()
+        self._image = image = QLabel()
+        self._picture = picture
         image.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        image.setFixedHeight(round(10 * line))
-        if picture is None:
-            image.setText("no picture yet")
-            image.setEnabled(False)
-        else:
-            ratio = self.devicePixelRatioF()
-            size = QSize(round(14 * line * ratio), round(10 * line * ratio))
-            shown = picture.scaled(size, Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation)
-            shown.setDevicePixelRatio(ratio)
-            image.setPixmap(QPixmap.fromImage(shown))
         title = QLabel(card.title)
         title.setWordWrap(True)
         bold = QFont(title.font())
@@ -114,16 +104,43 @@ class HypothesisCard(QFrame):
         self.pin.setToolTip("Hold this answer, and go on from it; can be undone")
         self.pin.setEnabled(not card.in_use)
         self.pin.clicked.connect(lambda: self.pin_requested.emit(card.candidate))
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(6, 6, 6, 6)
-        for part in (image, title, EnergyBar(card.terms, highest), figures, badge):
-            layout.addWidget(part)
-        layout.addStretch(1)
-        layout.addWidget(self.pin)
+        column = QVBoxLayout()
+        column.setSpacing(4)
+        for part in (title, EnergyBar(card.terms, highest), figures, badge):
+            column.addWidget(part)
+        column.addStretch(1)
+        column.addWidget(self.pin)
+        self._layout = QBoxLayout(QBoxLayout.Direction.TopToBottom, self)
+        self._layout.setContentsMargins(6, 6, 6, 6)
+        self._layout.addWidget(image)
+        self._layout.addLayout(column, 1)
+        self.set_low(False)
         said = ", ".join(
             [card.title, f"heading {card.heading_deg:.0f} degrees", f"{card.margin:.2f} times best", *badges]
         )
         self.setAccessibleName(said)
+
+    def set_low(self, low: bool) -> None:
+        """Put the picture beside the figures instead of above them, where there is little height."""
+        line = self.fontMetrics().height()
+        directions = QBoxLayout.Direction
+        self._layout.setDirection(directions.LeftToRight if low else directions.TopToBottom)
+        self._image.setFixedSize(
+            *((round(8 * line), round(7.5 * line)) if low else (round(14 * line), round(10 * line)))
+        )
+        self.setFixedWidth(round((22 if low else 15) * line))
+        if self._picture is None:
+            self._image.setText("no picture yet")
+            self._image.setEnabled(False)
+            return
+        ratio = self.devicePixelRatioF()
+        size = self._image.size() * ratio
+        keep, smooth = Qt.AspectRatioMode.KeepAspectRatioByExpanding, Qt.TransformationMode.SmoothTransformation
+        shown = self._picture.scaled(size, keep, smooth)
+        beyond = (shown.width() - size.width()) // 2, (shown.height() - size.height()) // 2
+        shown = shown.copy(*beyond, size.width(), size.height())
+        shown.setDevicePixelRatio(ratio)
+        self._image.setPixmap(QPixmap.fromImage(shown))
 
     def set_chosen(self, on: bool) -> None:
         """Frame the card."""
@@ -202,6 +219,16 @@ class HypothesesView(QWidget):
             made.pin_requested.connect(self.pin_requested)
             self._row.addWidget(made)
         self._row.addStretch(1)
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Keep the figures in sight where there is little height."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        for made in self._cards:
+            made.set_low(self.height() < 24 * em(self))
 
     def cards(self) -> list[HypothesisCard]:
         """The cards, left to right."""

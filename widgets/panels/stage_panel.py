@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QSize, Qt, Signal
 from PySide6.QtWidgets import QFrame, QScrollArea, QVBoxLayout, QWidget
 
 from widgets.panels.stage_card import StageCard
@@ -62,6 +62,12 @@ class StagePanel(QScrollArea):
         """Open a stage's card and bring it into sight."""
         self._cards[name].set_open(True)
         self.ensureWidgetVisible(self._cards[name])
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Ask for the width that the cards need now: nothing of them may be out of sight."""
+        if watched is self._inner and event.type() == QEvent.Type.LayoutRequest:
+            self.updateGeometry()
+        return super().eventFilter(watched, event)
 
     def sizeHint(self) -> QSize:
         """A column."""

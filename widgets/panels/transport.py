@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from PySide6.QtCore import QSignalBlocker, QSize, Signal
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QSizePolicy, QToolButton, QWidget
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
 from widgets.icons import icon
 from widgets.plots.scales import clock
@@ -88,9 +88,11 @@ class Transport(QWidget):
         layout.addWidget(self.speed)
         layout.addWidget(self.loop)
         layout.addStretch(1)
-        layout.addWidget(self.markers)
-        layout.addSpacing(18)
-        layout.addWidget(self.video)
+        readouts = QVBoxLayout()
+        readouts.setSpacing(0)
+        readouts.addWidget(self.markers)
+        readouts.addWidget(self.video)
+        layout.addLayout(readouts)
         self.play.clicked.connect(self.play_toggled)
         self.back.clicked.connect(lambda: self.stepped.emit(-1))
         self.forward.clicked.connect(lambda: self.stepped.emit(1))
@@ -128,7 +130,7 @@ class Transport(QWidget):
                 label.setMinimumWidth(wide)
 
     def sizeHint(self) -> QSize:
-        """One line."""
+        """One line of buttons, two of readouts."""
         return QSize(self.layout().sizeHint().width(), self.layout().sizeHint().height())  # type: ignore[union-attr]
 
     def _button(self, glyph: str, tip: str) -> QToolButton:

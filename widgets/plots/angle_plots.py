@@ -159,7 +159,7 @@ class AnglePlots(QWidget):
             if high - low < 10:  # a joint that rests should look at rest
                 low, high = (low + high) / 2 - 5, (low + high) / 2 + 5
             x, y = self.scale(area), Scale(low, high, area.bottom(), area.top())
-            y_axis(painter, area, y, "°", 1.7 * line)
+            y_axis(painter, area, y, "°", 1.5 * line)
             painter.setClipRect(area)
             if low < 0 < high:
                 painter.setPen(pen(look.border, 1.2))

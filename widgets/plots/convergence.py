@@ -93,15 +93,19 @@ class ConvergenceView(QWidget):
         self.slider.valueChanged.connect(lambda k: self._choose(self.chosen(), k, tell=True))
         self.play.toggled.connect(self._play)
 
-    def set_curves(self, curves: Sequence[Any]) -> None:
-        """Show descents: objects with stage, label, iteration (n,), energy (n,), colour, ended; more may come."""
+    def set_curves(self, curves: Sequence[Any], preferred: str = "") -> None:
+        """Show descents: objects with stage, label, iteration (n,), energy (n,), colour, ended; more may come.
+
+        Where no stage was chosen before, it is the ``preferred`` one, else the last.
+        """
         stage, chosen, at = self.stage.currentText(), self.curve.currentText(), self.slider.value()
         at_end = at == self.slider.maximum() or self.chosen() < 0
         self._curves = tuple(curves)
         stages = list(dict.fromkeys(curve.stage for curve in curves))
         self.stage.clear()
         self.stage.addItems(stages)
-        self.stage.setCurrentIndex(stages.index(stage) if stage in stages else len(stages) - 1)
+        wanted = stage if stage in stages else preferred
+        self.stage.setCurrentIndex(stages.index(wanted) if wanted in stages else len(stages) - 1)
         self._fill(chosen, None if at_end else at)
 
     def set_iteration(self, curve: int, iteration: int) -> None:

@@ -96,7 +96,9 @@ class CurvesView(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(split)
 
-    def set_curves(self, time: np.ndarray, plots: Sequence[Any], convention: str = "", zero_pose: str = "") -> None:
+    def set_curves(
+        self, time: np.ndarray, plots: Sequence[Any], convention: str = "", zero_pose: str = "", reference: str = ""
+    ) -> None:
         """Show a result.
 
         Parameters
@@ -104,14 +106,15 @@ class CurvesView(QWidget):
         time : (T,) s
         plots : see :class:`widgets.plots.angle_data.AnglePlot`; references are drawn dashed
         convention, zero_pose : what the angles are, in words
+        reference : what the dashed curves are of, in words
         """
         again = [plot.title for plot in plots] == [plot.title for plot in self._all]
         self._time, self._all = np.asarray(time, float), tuple(plots)
-        zero = f", counted from {zero_pose}" if zero_pose else ""
+        zero = f" Counted from {zero_pose[:1].lower()}{zero_pose[1:].rstrip('.')}." if zero_pose else ""
         dashed = any(curve.reference is not None for plot in plots for curve in plot.curves)
-        self._title.setText(
-            f"{convention}{zero}, degrees{'. Dashed: compared with.' if dashed else ''}" if plots else ""
-        )
+        against = f" Dashed: {reference or 'compared with'}." if dashed else ""
+        self._title.setText(f"{convention}, degrees.{against}" if plots else "")
+        self._title.setToolTip(f"{convention}, degrees.{zero}" if plots else "")
         if not again:
             self._fill()
         self._show()

@@ -43,8 +43,8 @@ class PresencePainter:
         self.outlier = None if row.outlier is None else Counts(row.outlier)
 
     def height(self, em: float) -> float:
-        """Three pixels a marker at least, and room for two lines of text."""
-        return max(2.2 * em, 3.0 * self.markers)
+        """Some two pixels a marker where there is little room, and room for two lines of text."""
+        return max(2.2 * em, min(3.0 * self.markers, 4.6 * em))
 
     def paint(self, painter: QPainter, area: QRectF, x: Scale) -> None:
         """Draw the strips as one picture."""
@@ -186,7 +186,7 @@ class CurvePainter:
 
     def height(self, em: float) -> float:
         """Four lines of text, so that a legend does not hide the curves."""
-        return 4.5 * em
+        return 4.0 * em
 
     def y_scale(self, area: QRectF) -> Scale:
         """Values to pixels."""
@@ -196,7 +196,7 @@ class CurvePainter:
         """Draw the axis, the lines and their names."""
         metrics = QFontMetricsF(painter.font())
         y = self.y_scale(area)
-        y_axis(painter, area, y, self.row.unit, 1.8 * metrics.height())
+        y_axis(painter, area, y, self.row.unit, 1.25 * metrics.height())
         painter.setClipRect(area)
         for curve in self.row.curves:
             draw_curve(painter, area, x, y, curve, self.row.time)
@@ -230,7 +230,7 @@ class OffsetPainter:
 
     def height(self, em: float) -> float:
         """Two lines: the name of the bar and the curves to match."""
-        return 3.2 * em
+        return 2.8 * em
 
     def ends(self) -> tuple[float, float]:
         """Of the video, on the markers' clock."""

@@ -28,13 +28,15 @@ def ticks(low: float, high: float, most: int) -> list[float]:
 def log_ticks(low: float, high: float, most: int = 6) -> list[float]:
     """Powers of ten between two positive ends, with 2 and 5 between them where there is room."""
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
-    stride = max(1, math.ceil((last - first) / max(most, 1)))
-    for inner in ((1, 2, 5), (1, 3), (1,)):
-        found = [k * 10.0**p for p in range(first, last + 1, stride) for k in inner]
-        found = [value for value in found if low * (1 - 1e-9) <= value <= high * (1 + 1e-9)]
-        if len(found) <= most:
+    decades = range(first, last + 1)
+    tried = [[(p, k) for p in decades for k in inner] for inner in ((1, 2, 5), (1, 3), (1,))]
+    tried += [[(p, 1) for p in decades[shift::stride]] for stride in range(2, len(decades)) for shift in range(stride)]
+    for parts in tried:
+        found = [k * 10.0**p for p, k in parts if low * (1 - 1e-9) <= k * 10.0**p <= high * (1 + 1e-9)]
+        if 2 <= len(found) <= most:
             return found
-    return found
+    # Within less than a decade there may be none of them: round numbers then, however they are spaced.
+    return ticks(low, high, max(2, min(most, 4)))
 
 
 def number(value: float, step: float | None = None) -> str:
@@ -113,7 +115,11 @@ class Scale:
     def ticks(self, apart: float) -> list[float]:
         """Round values about ``apart`` pixels from each other."""
         most = max(2, int(abs(self.end - self.start) / max(apart, 1)))
-        return log_ticks(self.low, self.high, most) if self.log else ticks(self.low, self.high, most)
+        if self.log:
+            return log_ticks(self.low, self.high, most)
+        # One number alone tells no scale, so there are two however low the plot is.
+        tried = (ticks(self.low, self.high, more) for more in range(most, most + 4))
+        return next((found for found in tried if len(found) > 1), ticks(self.low, self.high, most))
 
 
 def limits(values: list[np.ndarray], lowest: float | None = None, room: float = 0.05) -> tuple[float, float]:

@@ -233,7 +233,7 @@ class ArrayTable(QWidget):
         header = self.view.horizontalHeader()
         self.view.resizeColumnsToContents()
         for k in range(header.count()):
-            header.resizeSection(k, min(max(header.sectionSize(k) + 6, 3 * line), 18 * line))
+            header.resizeSection(k, min(max(header.sectionSize(k) + 2, 3 * line), 18 * line))
         header.setStretchLastSection(False)
 
     def _filter(self, text: str) -> None:

@@ -30,6 +30,7 @@ class CandidateRecord:
     Attributes
     ----------
     part : the bones that carry markers, in words
+    bones : their names
     fate : how far it got
     yaw_deg, heading_deg : degrees, the yaw it started from, and which way it ended up; NaN if there is none
     distance : mm, from the markers to the body as first laid over them; NaN if it was not
@@ -50,6 +51,7 @@ class CandidateRecord:
     covered: float = float("nan")
     same_as_first: bool = False
     in_use: bool = False
+    bones: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class SearchStep:
 
 
 def candidate_columns(
-    rows: Sequence[Any], score: str = "Score", unit: str = "", colours: np.ndarray | None = None
+    rows: Sequence[Any], score: str = "Score", unit: str = "", colours: np.ndarray | None = None, meaning: str = ""
 ) -> list[Column]:
     """The table of candidates, given what they are ranked by; ``colours`` (N, 3) uint8 are those of their ghosts."""
 
@@ -73,13 +75,18 @@ def candidate_columns(
     states = [f"{state}, in use" if row.in_use else state for state, row in zip(states, rows)]
     return [
         Column("Rank", np.arange(1, len(rows) + 1), tooltip="Place, the best first", colours=colours),
-        Column("Bones", [row.part for row in rows], tooltip="The part of the body that the groups are taken for"),
-        Column(score, figures("score"), unit, "#.3g", "What the candidates are ranked by, the least first"),
+        Column(
+            "Bones",
+            [row.part for row in rows],
+            tooltip="The part of the body that the groups are taken for",
+            tips=[", ".join(row.bones) for row in rows],
+        ),
+        Column(score, figures("score"), unit, "#.3g", meaning or "What the candidates are ranked by, the least first"),
         Column("Margin", figures("margin"), "× best", ".2f", "Score over that of the best: near 1 they tie"),
-        Column("Distance", figures("distance"), "mm", ".0f", "From the markers to the body as first laid over them"),
+        Column("Markers", figures("covered", 100), "%", ".0f", "Share of the markers that it explains", bar=(0, 100)),
         Column("Yaw", figures("yaw_deg"), "deg", ".0f", "About the vertical axis, as it was started"),
         Column("Heading", figures("heading_deg"), "deg", ".0f", "Which way it ended up, about the vertical axis"),
-        Column("Markers", figures("covered", 100), "%", ".0f", "Share of the markers that it explains", bar=(0, 100)),
+        Column("Distance", figures("distance"), "mm", ".0f", "From the markers to the body as first laid over them"),
         Column("State", states, tooltip="How far the search took it"),
     ]
 
@@ -154,9 +161,10 @@ class CandidateTable(QWidget):
         score: str = "Score",
         unit: str = "",
         colours: np.ndarray | None = None,
+        meaning: str = "",
     ) -> None:
         """Show candidates, see :func:`candidate_columns`; more may come while the search runs."""
-        self.table.set_columns(candidate_columns(rows, score, unit, colours), pinned)
+        self.table.set_columns(candidate_columns(rows, score, unit, colours, meaning), pinned)
 
     def _keep(self, name: str) -> None:
         kept = next((step.rows for step in self._known if step.name == name), None)

@@ -23,6 +23,7 @@ class Column:
     left : True to put it left; words are anyway
     bar : values of an empty and of a full bar behind the number, None for no bar
     colours : (N, 3) uint8 of a swatch before the text
+    tips : one a row, for the tooltip of its cell
     """
 
     title: str
@@ -33,6 +34,7 @@ class Column:
     left: bool = False
     bar: tuple[float, float] | None = None
     colours: np.ndarray | None = None
+    tips: Sequence[str] = ()
 
     @property
     def heading(self) -> str:

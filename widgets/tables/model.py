@@ -80,6 +80,8 @@ class ArrayModel(QAbstractTableModel):
             return column.text(row)
         if role == _Role.ToolTipRole:
             text = column.text(row)
+            if row < len(column.tips) and column.tips[row]:
+                return column.tips[row]
             return (
                 f"{text} {column.unit}".rstrip() if column.tooltip == "" else f"{text} {column.unit}: {column.tooltip}"
             )
