@@ -95,7 +95,7 @@ GRAPH = (
     Stage("segment", 1, SegmentSettings, ("clean",), fitting.group_markers, Segmentation, said_segmentation, cost=0.3),
     Stage(
         "localize",
-        2,
+        3,
         LocalizeSettings,
         (*FITTED_TO, "segment", "camera_file"),
         fitting.place_markers,
@@ -105,7 +105,7 @@ GRAPH = (
     ),
     Stage(
         "orient",
-        3,
+        4,
         OrientSettings,
         (*FITTED_TO, "localize", "camera_file"),
         fitting.rank_placements,

@@ -70,18 +70,15 @@ class Round:
 
 _PLACED = Phase(0.02, 0.08, 3, reassign=True, free_placement=True)
 SEARCH = (
-    Round(Phase(0.04, 0.16, 3, free_shape=False, prior=0.5), 2.6, 48),
-    Round(Phase(0.03, 0.12, 3, reassign=True, prior=0.5), 2.3, 24),
-    Round(Phase(0.025, 0.10, 3, reassign=True, prior=0.5), 2.0, 16),
+    Round(Phase(0.04, 0.16, 3, free_shape=False, prior=0.5), 2.8, 48),
+    Round(Phase(0.03, 0.12, 3, reassign=True, prior=0.5), 2.8, 24),
+    Round(Phase(0.025, 0.10, 3, reassign=True, prior=0.5), 2.8, 16),
     Round(_PLACED, 1.7, 12),
     Round(_PLACED, 1.5, 10),
     Round(_PLACED, 1.3, 8),
     Round(_PLACED, 1.2, 8),
 )
 """On few keyframes: poor starts are dropped early, more of them the clearer it is which are poor."""
-WATCHED = tuple(Round(round_.phase, np.inf, 8) for round_ in SEARCH[:3])
-"""The same where landmarks are seen: they tell the few starts apart that are worth it, but only at the end."""
-_WATCHED_STARTS = 16
 FINE = (
     Phase(0.015, 0.06, 4, reassign=True, free_placement=True),
     Phase(0.01, 0.04, 6, free_placement=True),
@@ -275,14 +272,12 @@ def relax(
         state, surface = start_state(problem, guess, base, camera, skin)
         return Fit(guess, state, surface, problem.energies(state, base, surface), ())
 
-    watched = bool(problem.in_image.any())
-    rounds, fine_phases = (WATCHED, (_PLACED, *FINE)) if watched else (SEARCH, FINE)
-    pool = [begun(guess) for guess in (guesses[:_WATCHED_STARTS] if watched else guesses)]
+    pool = [begun(guess) for guess in guesses]
     say = partial(_tell, progress, guesses)
     left: list[Fit] = []
     best = np.inf
-    for i, round_ in enumerate(rounds):
-        progress(0.6 * i / len(rounds), f"relaxing {len(pool)} hypotheses")
+    for i, round_ in enumerate(SEARCH):
+        progress(0.6 * i / len(SEARCH), f"relaxing {len(pool)} hypotheses")
         judge = phase_weights(base, round_.phase)
         pool = spread(partial(_advance, problem, phases=(round_.phase,), base=base, judge=judge), pool)
         say(pool)
@@ -307,14 +302,14 @@ def relax(
         return _advance(
             whole,
             replace(fit, state=replace(fit.state, pose=pose), refined=True),
-            phases=fine_phases[:1],
+            phases=FINE[:1],
             base=base,
             judge=judge,
         )
 
     fine = _basins(spread(closer_look, chosen))
     say(fine)
-    fine = spread(partial(_advance, whole, phases=fine_phases[1:], base=base, judge=judge), fine)
+    fine = spread(partial(_advance, whole, phases=FINE[1:], base=base, judge=judge), fine)
     fine.sort(key=lambda fit: fit.energies.total)
     say(fine)
     return tuple(fine) + tuple(left[:_SHOWN])

@@ -40,14 +40,14 @@ class LocalizeSettings:
     Attributes
     ----------
     yaws : starts of the camera's heading, evenly spread over the circle
-    few, many : keyframes of the coarse and of the fine solve; a quarter fewer coarse ones where landmarks are seen
+    few, many : keyframes of the coarse and of the fine solve
     keep : hypotheses handed on at most; those that are clearly worse than the best are not
     seen_share : share of the frames in which a marker must be seen to be used in the search
     any_orientation : also try lab frames that do not stand upright
     """
 
     yaws: int = 8
-    few: int = 16
+    few: int = 12
     many: int = 40
     keep: int = 160
     seen_share: float = 0.05
@@ -137,8 +137,7 @@ def localize(
         raise InputError(
             f"only {len(used)} markers are seen in enough frames", "the markers", "record or keep at least 3 markers"
         )
-    # In fewer of them do landmarks tell as much.
-    few = keyframes(seen, used, settings.few * 3 // 4 if _sees_landmarks(seen) else settings.few)
+    few = keyframes(seen, used, settings.few)
     many = np.union1d(few, keyframes(seen, used, settings.many))
     betas = np.zeros(body.shape_count)
     vertices = np.intersect1d(body.lod_index, np.flatnonzero(body.marker_mask))[::3]

@@ -45,7 +45,7 @@ class RigidBody:
         import torch
 
         body, count = sequence.body, len(sequence.betas)
-        root = torch.as_tensor(body.joint_template[0])
+        root = torch.tensor(body.joint_template[0])
         root_dirs = torch.as_tensor(body.joint_dirs[0, :, :count])
         index = torch.as_tensor(vertices)
         rotations = sequence.rotations.float()
