@@ -46,7 +46,7 @@ class RigidBody:
 
         body, count = sequence.body, len(sequence.betas)
         root = torch.tensor(body.joint_template[0])
-        root_dirs = torch.as_tensor(body.joint_dirs[0, :, :count])
+        root_dirs = torch.tensor(body.joint_dirs[0, :, :count])
         index = torch.as_tensor(vertices)
         rotations = sequence.rotations.float()
         still = torch.zeros(len(rotations), 3)
