@@ -38,6 +38,9 @@ class Asks(Protocol):
     def number(self, question: str, value: float, unit: str) -> float | None:
         """A number."""
 
+    def choice(self, question: str, options: Sequence[str]) -> int | None:
+        """Which of several, by its place."""
+
     def pictures(self) -> Sequence[Any]:
         """Views of the session, for the report."""
 

@@ -72,6 +72,19 @@ def _group(edit: GroupEdit) -> Callable[[Workbench, Asks], object]:
     return run
 
 
+def _move(bench: Workbench, asks: Asks) -> None:
+    found: Segmentation = bench.board.current["segment"]
+    labels, chosen = bench.board.current["markers"].labels, bench.selection.markers
+    own = {int(found.clusters[m]) for m in chosen}
+    targets = [k for k in range(found.count) if own != {k}]
+    members = {k: [labels[m] for m in np.flatnonzero(found.clusters == k)] for k in targets}
+    options = [f"Group {k + 1}: {', '.join(members[k][:4])}{' …' if len(members[k]) > 4 else ''}" for k in targets]
+    place = asks.choice("Move the selected markers to", options)
+    if place is not None:
+        host = int(np.flatnonzero(found.clusters == targets[place])[0])
+        bench.document.apply(group_edits.move(bench.document.session, found, chosen, host, labels))
+
+
 def _take_in(bench: Workbench, asks: Asks) -> None:
     labels = bench.board.current["markers"].labels
     bench.document.apply(group_edits.take_in(bench.document.session, bench.selection.markers, labels))
@@ -173,6 +186,15 @@ EDIT_ACTIONS = (
         first(_needs_groups, _ONE),
     ),
     Action(
+        "groups.move",
+        "Move to group...",
+        "Edit",
+        "Put the selected markers into another group.",
+        _move,
+        "Shift+M",
+        first(_needs_groups, _ONE),
+    ),
+    Action(
         "groups.leave_out",
         "Leave out",
         "Edit",
@@ -183,7 +205,7 @@ EDIT_ACTIONS = (
     ),
     Action(
         "groups.take_in",
-        "Take in again",
+        "Put back in",
         "Edit",
         "Have selected markers back that were left out.",
         _take_in,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from app.actions.action import Action, Asks, needs_session
 from app.models.display import COLOURS, LAYERS, ColourBy
 from app.models.workbench import Workbench
@@ -13,7 +15,10 @@ _COLOUR_TITLES: dict[ColourBy, str] = {
     "gaps": "Colour by gaps",
     "selection": "Colour by selection",
 }
-_CAMERAS = ("front", "back", "left", "right", "top", "isometric")
+_CAMERAS = {
+    "front": "From the front", "back": "From the back", "left": "From the left", "right": "From the right",
+    "top": "From the top", "isometric": "From a corner",
+}  # fmt: skip
 _LAYER_KEYS = {"labels": "L", "trails": "T", "body": "B", "skeleton": "K", "ghosts": "H"}
 
 
@@ -61,21 +66,66 @@ def _follow(bench: Workbench, asks: Asks) -> None:
     bench.display.set(follow=not bench.display.follow)
 
 
+def _box(bench: Workbench, asks: Asks) -> None:
+    bench.display.set(boxing=not bench.display.boxing)
+
+
+def _opacity(by: float) -> Callable[[Workbench, Asks], object]:
+    def run(bench: Workbench, asks: Asks) -> None:
+        bench.display.show("body", True)
+        bench.display.set(opacity=round(min(max(bench.display.opacity + by, 0.0), 1.0), 2))
+
+    return run
+
+
+def _trails(by: float) -> Callable[[Workbench, Asks], object]:
+    def run(bench: Workbench, asks: Asks) -> None:
+        length = round(min(max(bench.display.trail_s + by, 0.0), 10.0), 2)
+        bench.display.set(trail_s=length)
+        bench.display.show("trails", length > 0)
+
+    return run
+
+
 VIEW_ACTIONS = (
+    Action(
+        "tool.select",
+        "Select by a box",
+        "View",
+        "A drag in the scene draws a box about markers; Shift+drag does so at any time.",
+        _box,
+        "Q",
+        checked=lambda bench: bench.display.boxing,
+    ),
     *(_colour(colour, number) for number, colour in enumerate(COLOURS, start=1)),
     *(_layer(layer) for layer in LAYERS),
+    Action("body.less", "Body clearer", "View", "Make the body more transparent by 10 %.", _opacity(-0.1), "O"),
+    Action("body.more", "Body denser", "View", "Make the body more opaque by 10 %.", _opacity(0.1), "Shift+O"),
+    Action(
+        "trails.shorter",
+        "Trails shorter",
+        "View",
+        "Have the trails reach 0.1 s less far back.",
+        _trails(-0.1),
+        "Ctrl+T",
+    ),
+    Action(
+        "trails.longer", "Trails longer", "View", "Have the trails reach 0.1 s further back.", _trails(0.1), "Shift+T"
+    ),
     Action(
         "camera.follow",
         "Follow the person",
         "View",
         "The camera goes where the person goes.",
         _follow,
+        "J",
         checked=lambda bench: bench.display.follow,
     ),
     *(
-        _show(f"camera.{name}", f"From {name}" if name != "isometric" else "From a corner", "View", help)
-        for name, help in zip(_CAMERAS, [f"Look from the {name}." for name in _CAMERAS[:-1]] + ["Look from a corner."])
+        _show(f"camera.{name}", title, "View", f"Look {title[0].lower()}{title[1:]}.", f"Ctrl+{number}")
+        for number, (name, title) in enumerate(_CAMERAS.items(), start=1)
     ),
+    _show("camera.fit", "Show everything", "View", "Bring all that is drawn into sight.", "Ctrl+0"),
     _show("camera.selected", "Frame the selection", "View", "Bring the selected markers, or all, into sight.", "F"),
     _show("export.picture", "Picture of the scene...", "Export", "Write the scene as PNG.", "Ctrl+Shift+P", True),
     _show("export.turntable", "Turntable...", "Export", "Write the scene, turned once round, as MP4.", "", True),

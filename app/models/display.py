@@ -32,8 +32,9 @@ class Display:
     colour_by : what the markers' colours mean
     layers : whether each layer of ``LAYERS`` is shown
     opacity : 0..1, of the body
-    trail_s : s, length of the trails to either side of now
+    trail_s : s, how far back the trails reach
     follow : whether the camera goes with the person
+    boxing : whether a plain drag in the scene draws a box about markers
     changed : emitted with the names of what changed; a layer is "layer.NAME"
     """
 
@@ -44,9 +45,10 @@ class Display:
         self.opacity = 0.6
         self.trail_s = 0.5
         self.follow = False
+        self.boxing = False
 
     def set(self, **values: Any) -> None:
-        """Change ``colour_by``, ``opacity``, ``trail_s`` or ``follow``; what cannot be is left as it is."""
+        """Change any of the values; what cannot be is left as it is."""
         names = set()
         for name, value in values.items():
             if name in _SOUND and _SOUND[name](value) and getattr(self, name) != value:
@@ -87,5 +89,6 @@ _SOUND = {
     "opacity": _number(0, 1),
     "trail_s": _number(0, 60),
     "follow": lambda v: isinstance(v, bool),
+    "boxing": lambda v: isinstance(v, bool),
 }
 """What each value must be."""

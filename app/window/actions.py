@@ -10,7 +10,9 @@ from widgets.dialogs.command_palette import PaletteEntry
 
 _SEPARATED = {
     "session.example", "input.video", "session.save", "session.close", "select.all", "select.groups", "candidate.pin",
-    "offset.found", "range.selected", "layer.markers", "camera.follow", "camera.front", "theme.light", "window.layout",
+    "offset.found",
+    "range.selected", "colour.cluster", "layer.markers", "body.less", "camera.follow", "camera.front",
+    "theme.light", "window.layout",
     "play.forward", "range.from", "go.worst", "run.stop", "method.bundle", "export.picture", "help.about",
     "window.history",
 }  # fmt: skip

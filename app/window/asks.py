@@ -95,6 +95,11 @@ class WindowAsks:
         found, given = QInputDialog.getDouble(self.window, question, f"{question} ({unit})", value, -1e6, 1e6, 4)
         return found if given else None
 
+    def choice(self, question: str, options: Sequence[str]) -> int | None:
+        """Which of several."""
+        text, given = QInputDialog.getItem(self.window, question, question, list(options), 0, False)
+        return list(options).index(text) if given else None
+
     def pictures(self) -> Sequence[Any]:
         """Views of the session, for the report."""
         return report_pictures(self.window)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from PySide6.QtCore import Qt
 
 from app.models import group_edits
-from app.models.edits import Edit
 from app.models.workbench import Workbench
 from app.views.affinity import affinity_picture, pair_distance, recut
 from app.window.bind_scene import SceneBinder
+from app.window.group_menu import GroupEdits
 from app.window.keys import how
 from app.window.shown import Shown
 from widgets.plots.affinity import AffinityView
@@ -26,6 +24,7 @@ class AffinityBinder:
     ) -> None:
         self.widget, self.pair, self.bench, self.shown, self.scene = widget, pair, bench, shown, scene
         self._pair: tuple[int, int] | None = None
+        self.edits = GroupEdits(bench, shown)
         bench.selection.changed.connect(lambda what: self._select())
         bench.clock.moved.connect(pair.set_time)
         shown.changed.connect(self._changed)
@@ -33,7 +32,7 @@ class AffinityBinder:
         widget.cut_committed.connect(self._commit)
         widget.pair_clicked.connect(lambda i, j: bench.selection.select_markers([i, j]))
         widget.leaves_clicked.connect(self._leaves)
-        widget.edit_requested.connect(self._edit)
+        widget.edit_requested.connect(self.edits.ask)
         pair.seeked.connect(bench.clock.seek)
 
     def _changed(self, stages: frozenset[str]) -> None:
@@ -68,20 +67,6 @@ class AffinityBinder:
 
     def _leaves(self, markers: list[int], held: Qt.KeyboardModifier) -> None:
         self.bench.selection.select_markers(markers, how(held))
-
-    def _edit(self, kind: str, markers: list[int], target: int) -> None:
-        self.bench.attempt(lambda: self.bench.document.apply(self._made(kind, markers, target)))
-
-    def _made(self, kind: str, markers: list[int], target: int) -> Edit:
-        found, session = self.shown.segmentation, self.bench.document.session
-        labels = self.shown.markers.labels  # type: ignore[union-attr]
-        if kind == "move":
-            host = int(np.flatnonzero(found.clusters == target)[0])
-            return group_edits.move(session, found, markers, host, labels)
-        edits: dict[str, Callable[..., Edit]] = {
-            "merge": group_edits.merge, "split": group_edits.split, "leave_out": group_edits.leave_out,
-        }  # fmt: skip
-        return edits[kind](session, found, markers, labels)
 
     def _select(self) -> None:
         pair, found, markers = self.bench.selection.pair, self.shown.segmentation, self.shown.markers

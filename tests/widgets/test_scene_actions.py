@@ -86,7 +86,8 @@ def test_mouse_and_keys_move_the_camera(scene: Scene3D, mouse: Callable[..., Non
         QApplication.sendEvent(scene, event)
         return event.isAccepted()
 
-    assert key(Qt.Key.Key_1) and scene.camera.elevation == 0 and scene.camera.azimuth == pytest.approx(0)
+    assert not key(Qt.Key.Key_1), "plain digits are the window's"
+    assert key(Qt.Key.Key_1, CONTROL) and scene.camera.elevation == 0 and scene.camera.azimuth == pytest.approx(0)
     assert key(Qt.Key.Key_Up, CONTROL) and scene.camera.elevation == pytest.approx(np.radians(5))
     assert key(Qt.Key.Key_Minus) and key(Qt.Key.Key_0)
     far = np.abs(scene.project(THREE) / [480, 360] - 0.5).max()

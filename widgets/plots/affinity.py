@@ -43,7 +43,8 @@ class AffinityView(QWidget):
     cut_committed(height) : m, as it is let go or moved by a key
     pair_clicked(i, j) : a cell of the matrix
     leaves_clicked(markers, modifiers) : a label, a group's strip, or all below a branch
-    edit_requested(kind, markers, target) : "merge", "split", "leave_out", or "move" to the group ``target`` (else -1)
+    edit_requested(kind, markers, target) : "merge", "split", "leave_out", "take_in", or "move" to the group ``target``
+        (else -1)
     """
 
     cut_dragged = Signal(float)

@@ -46,5 +46,6 @@ def edit_menu(
         swatch = QPixmap(16, 16)
         swatch.fill(colour(colours[members[0]]))
         moves.addAction(QIcon(swatch), text, lambda g=group: ask("move", markers, g))
-    add("leave_out", "Leave out", True)
+    add("leave_out", "Leave out", bool(groups))
+    add("take_in", "Put back in", bool((clusters[markers] < 0).any()))
     return menu

@@ -23,7 +23,7 @@ _WAYS = {
 }  # fmt: skip
 HELP = (
     "Drag to orbit, right-drag or Ctrl+drag to pan, wheel to zoom. Click a marker to select it, Shift+drag a box about "
-    "several. Keys: 1 to 6 views, 0 everything, Ctrl+arrows orbit, Ctrl+Shift+arrows pan, + and - zoom."
+    "several. Keys: Ctrl+1 to Ctrl+6 views, 0 everything, Ctrl+arrows orbit, Ctrl+Shift+arrows pan, + and - zoom."
 )
 
 
@@ -106,8 +106,11 @@ class Navigator:
         elif key == Qt.Key.Key_Escape and self.band is not None:
             self.band = self._pressed = None
             self._scene.update()
-        elif key in _PRESET_KEYS and held == Qt.KeyboardModifier.NoModifier:
-            self._scene.view_from(_PRESET_KEYS[key])
+        elif key in _PRESET_KEYS and held in (control, Qt.KeyboardModifier.NoModifier):
+            name = _PRESET_KEYS[key]
+            if (name == "fit") == (held == control):  # plain digits are the colours', in the window
+                return False
+            self._scene.view_from(name)
         else:
             return False
         return True

@@ -53,6 +53,9 @@ class Answers:
     def number(self, question: str, value: float, unit: str) -> float | None:
         return self._answer(question)
 
+    def choice(self, question: str, options: Sequence[str]) -> int | None:
+        return self._answer(question)
+
     def pictures(self) -> Sequence[Any]:
         return self._answer("pictures", ())
 

@@ -66,6 +66,10 @@ class Answers:
     def number(self, question: str, value: float, unit: str) -> float | None:
         return None
 
+    def choice(self, question: str, options: Sequence[str]) -> int | None:
+        self.asked.append(question)
+        return 0
+
     def pictures(self) -> Sequence[Any]:
         from app.window.exporting import report_pictures
 
