@@ -24,6 +24,7 @@ from app.window.bind_hypotheses import HypothesesBinder
 from app.window.bind_markers import MarkersBinder
 from app.window.bind_messages import MessagesBinder
 from app.window.bind_scene import SceneBinder
+from app.window.bind_scene_bar import SceneBarBinder, make_bar
 from app.window.bind_stages import StagesBinder
 from app.window.bind_timelines import TimelinesBinder
 from app.window.bind_transport import TransportBinder
@@ -31,6 +32,7 @@ from app.window.bind_video import VideoBinder
 from app.window.bind_welcome import WelcomeBinder
 from app.window.docks import Docks, Panel
 from app.window.ghosts import Ghosts
+from app.window.group_menu import SceneMenu
 from app.window.keys import wants
 from app.window.remembering import parts_of, restore
 from app.window.shown import Shown
@@ -74,9 +76,9 @@ class MainWindow(QMainWindow):
         self.dropped_video: Path | None = None
         self.resize(1500, 940)
         self.setAcceptDrops(True)
-        self._make_widgets()
         self.asks: Asks = WindowAsks(self) if make_asks is None else make_asks(self)
         self.table = Actions(ACTIONS, bench, self.asks)
+        self._make_widgets()
         self.menus = Menus(self, self.table)
         self.shown = Shown(bench)
         self.ghosts = Ghosts(bench, self.shown)
@@ -98,6 +100,7 @@ class MainWindow(QMainWindow):
 
     def _make_widgets(self) -> None:
         self.scene, self.video, self.timelines = Scene3D(), VideoView(), Timelines()
+        self.scene_bar = make_bar(self.table)
         self.stages, self.transport, self.messages = StagePanel(), Transport(), MessageBar()
         self.affinity, self.pair = AffinityView(), PairPlot()
         self.candidates, self.hypotheses = CandidateTable(), HypothesesView()
@@ -106,7 +109,7 @@ class MainWindow(QMainWindow):
         self.pair.setVisible(False)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.welcome)
-        self.pages.addWidget(_column(self.scene, self.transport))
+        self.pages.addWidget(_column(self.scene_bar, self.scene, self.transport))
         self.setCentralWidget(_column(self.messages, self.pages))
         self.statusBar().addPermanentWidget(self.progress, 1)
         self.statusBar().setSizeGripEnabled(False)
@@ -129,8 +132,10 @@ class MainWindow(QMainWindow):
     def _bind(self) -> None:
         bench, shown, ghosts = self.bench, self.shown, self.ghosts
         self.scene_binder = scene = SceneBinder(self.scene, bench, shown, ghosts)
+        self.scene_menu = SceneMenu(self.scene, bench, shown, self.table)
         self.binders = [
             scene,
+            SceneBarBinder(self.scene_bar, self.scene, bench, self.table),
             VideoBinder(self.video, bench, shown),
             TimelinesBinder(self.timelines, bench, shown),
             StagesBinder(self.stages, self.progress, bench),
