@@ -15,14 +15,9 @@ import torch
 from torch import Tensor, nn
 
 from solver.body.skeleton import JOINTS, PARENTS
-from solver.neural.agnostic_moments import (
-    COMPARED,
-    OBSERVED,
-    carried,
-    compared,
-    forward_kinematics,
-    observed,
-)
+from solver.neural import kinematics
+from solver.neural.agnostic_moments import COMPARED, OBSERVED, compared, observed
+from solver.neural.examples import skinned
 
 BONES = len(JOINTS)
 _ABOVE = torch.tensor([max(int(p), 0) for p in PARENTS])
@@ -44,7 +39,7 @@ class AgnosticSettings:
     bone: int = 32
     width: int = 512
     blocks: int = 2
-    mend_width: int = 384
+    mend_width: int = 256
     mends: int = 3
 
 
@@ -109,7 +104,7 @@ class AgnosticSolver(nn.Module):
             gap = (frames.markers - last.markers) * frames.seen[..., None]
             extra = torch.cat([last.local.flatten(2), bone], dim=2)
             step = mend(compared(share, last.markers, gap, last.turn, last.place, extra))
-            turned = last.local @ exp_map(0.2 * step[:, :-3].unflatten(1, (BONES, 3)))
+            turned = last.local @ kinematics.exp(0.2 * step[:, :-3].unflatten(1, (BONES, 3)))
             moved = last.root + 0.05 * (last.turn[:, 0] @ step[:, -3:, None])[..., 0]
             poses.append(self._posed(frames, turned, moved))
         return poses
@@ -120,12 +115,14 @@ class AgnosticSolver(nn.Module):
         known = observed(share, frames.markers, frames.rest, frames.joints, frames.joints[:, _ABOVE])
         out = self.first(torch.cat([known, told], dim=2))
         identity = out.new_tensor([1.0, 0, 0, 0, 1, 0])
-        return gram_schmidt(out[:, :-3].unflatten(1, (BONES, 6)) + identity), 0.1 * out[:, -3:]
+        return kinematics.orthonormal(out[:, :-3].unflatten(1, (BONES, 6)) + identity), 0.1 * out[:, -3:]
 
     @staticmethod
     def _posed(frames: Frames, local: Tensor, root: Tensor) -> Posed:
-        turn, place = forward_kinematics(local, frames.joints, root)
-        return Posed(local, root, turn, place, carried(turn, place, frames.joints, frames.rest, frames.weights))
+        bones = kinematics.bones_of(frames.joints)
+        bones[:, 0] = root
+        turn, place = kinematics.forward(local, bones)
+        return Posed(local, root, turn, place, skinned(turn, place, frames.joints, frames.rest, frames.weights))
 
 
 class _Bones(nn.Module):
@@ -153,22 +150,3 @@ class _Bones(nn.Module):
             all_ = all_ + block(all_)
         out: Tensor = self.out(all_)
         return out
-
-
-def gram_schmidt(six: Tensor) -> Tensor:
-    """(..., 6), two columns one after the other, to the rotation (..., 3, 3) that they are nearest to in order."""
-    first = nn.functional.normalize(six[..., :3], dim=-1)
-    second = six[..., 3:] - (first * six[..., 3:]).sum(-1, keepdim=True) * first
-    second = nn.functional.normalize(second, dim=-1)
-    return torch.stack([first, second, torch.linalg.cross(first, second)], dim=-1)
-
-
-def exp_map(vector: Tensor) -> Tensor:
-    """(..., 3) rad to (..., 3, 3)."""
-    square = (vector * vector).sum(-1)[..., None, None]
-    angle = (square + 1e-12).sqrt()
-    zero = torch.zeros_like(vector[..., 0])
-    x, y, z = vector.unbind(-1)
-    k = torch.stack([zero, -z, y, z, zero, -x, -y, x, zero], dim=-1).unflatten(-1, (3, 3))
-    eye = torch.eye(3, dtype=vector.dtype)
-    return eye + torch.sin(angle) / angle * k + (1 - torch.cos(angle)) / (angle * angle) * (k @ k)

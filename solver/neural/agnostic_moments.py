@@ -9,50 +9,14 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from solver.body.skeleton import JOINTS, PARENTS, descendants
+from solver.body.skeleton import descendants
 
-LEVELS: tuple[tuple[int, ...], ...] = tuple(
-    tuple(j for j in range(len(JOINTS)) if int(descendants()[:, j].sum()) == depth + 1)
-    for depth in range(int(descendants().sum(axis=0).max()))
-)
-"""Joints by their distance from the root: what is turned together."""
-_ORDER = [j for level in LEVELS for j in level]
-_BACK = torch.tensor([_ORDER.index(j) for j in range(len(JOINTS))])
 _BELOW = torch.tensor(descendants(), dtype=torch.float32)
 _RIDGE = 4e-4
 """m2, two centimetres squared: markers nearer to each other than that say little about a rotation."""
 
 OBSERVED, COMPARED = 35, 46
 """Numbers a bone that ``observed`` and ``compared`` return."""
-
-
-def forward_kinematics(local: Tensor, rest: Tensor, root: Tensor) -> tuple[Tensor, Tensor]:
-    """Rotations (B, 24, 3, 3) and places (B, 24, 3) m of all joints in the frame that the root is given in.
-
-    Parameters
-    ----------
-    local : (B, 24, 3, 3) root in that frame, others relative to the parent
-    rest : (B, 24, 3) m, joints at rest
-    root : (B, 3) m, place of the root joint
-    """
-    turns, places = [local[:, :1]], [root[:, None]]
-    above = list(LEVELS[0])
-    for level in LEVELS[1:]:
-        parents = [int(PARENTS[j]) for j in level]
-        at = [above.index(p) for p in parents]
-        turn, joints = turns[-1][:, at], list(level)
-        bone = (rest[:, joints] - rest[:, parents])[..., None]
-        places.append(places[-1][:, at] + (turn @ bone)[..., 0])
-        turns.append(turn @ local[:, joints])
-        above = joints
-    return torch.cat(turns, 1)[:, _BACK], torch.cat(places, 1)[:, _BACK]
-
-
-def carried(turn: Tensor, place: Tensor, rest_joints: Tensor, rest: Tensor, weights: Tensor) -> Tensor:
-    """(B, M, 3) m, where markers at ``rest`` (B, M, 3) with skinning ``weights`` (B, M, 24) are on the posed body."""
-    shift = place - (turn @ rest_joints[..., None])[..., 0]
-    blended = weights @ torch.cat([turn.flatten(2), shift], dim=2)
-    return (blended[..., :9].unflatten(2, (3, 3)) @ rest[..., None])[..., 0] + blended[..., 9:]
 
 
 def observed(share: Tensor, markers: Tensor, rest: Tensor, joints: Tensor, parents: Tensor) -> Tensor:
