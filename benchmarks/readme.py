@@ -1,8 +1,9 @@
 """Put a benchmark's table into the README, between its marks: nothing there is typed by hand.
 
-    python -m benchmarks.readme OUT [--readme FILE]
+    python -m benchmarks.readme OUT [--marks NAME] [--readme FILE]
 
-OUT is the folder of ``markerscope bench SUITE --out OUT``; the marks are ``<!-- bench:SUITE begin -->`` and ``end``.
+OUT is the folder of ``markerscope bench SUITE --out OUT``; the marks are ``<!-- bench:NAME begin -->`` and ``end``,
+where NAME is the suite's unless another is given.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ from solver.io.atomic import write_text_atomic
 README = Path(__file__).parents[1] / "README.md"
 
 
-def put(out: Path, readme: Path) -> str:
-    """Replace what is between the marks of OUT's suite; returns the suite's name."""
+def put(out: Path, readme: Path, marks: str | None = None) -> str:
+    """Replace what is between the named marks, or those of OUT's suite; returns their name."""
     try:
-        suite = json.loads((out / "bench.json").read_text(encoding="utf-8"))["suite"]
+        suite = marks or json.loads((out / "bench.json").read_text(encoding="utf-8"))["suite"]
         table = (out / "bench.md").read_text(encoding="utf-8").strip()
     except (OSError, ValueError, KeyError) as error:
         raise InputError("holds no benchmark", out, "run markerscope bench SUITE --out there first") from error
@@ -30,7 +31,7 @@ def put(out: Path, readme: Path) -> str:
     head, found, rest = text.partition(begin)
     _, closed, tail = rest.partition(end)
     if not (found and closed):
-        raise InputError(f"has no marks for the suite {suite}", readme, f"add the lines {begin} and {end}")
+        raise InputError(f"has no marks {suite}", readme, f"add the lines {begin} and {end}")
     write_text_atomic(readme, f"{head}{begin}\n{table}\n{end}{tail}")
     return str(suite)
 
@@ -38,10 +39,11 @@ def put(out: Path, readme: Path) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
+    parser.add_argument("--marks", metavar="NAME")
     parser.add_argument("--readme", type=Path, default=README)
     options = parser.parse_args()
     try:
-        print(f"The table of {put(options.out, options.readme)} is in {options.readme}.")
+        print(f"The table of {put(options.out, options.readme, options.marks)} is in {options.readme}.")
     except InputError as error:
         print(error, file=sys.stderr)
         return 2
