@@ -10,10 +10,16 @@ from solver.pipeline.request import Method
 
 
 def run_until(bench: Workbench, stage: str | None) -> None:
-    """Run up to a stage, or all; says so where there is nothing to do."""
-    if not bench.runner.run(None if stage is None else [stage]):
-        what = "All results are" if stage is None else f"{title(stage)} is"
+    """Have every stage down to one, or all, computing only what is missing; says so where there is nothing to do."""
+    names = bench.board.names
+    if not bench.runner.run(None if stage is None else names[: names.index(stage) + 1]):
+        what = "All results are" if stage is None else f"Everything up to {title(stage)} is"
         bench.say(Said("note", f"{what} there for these settings already"))
+
+
+def run_stage(bench: Workbench, stage: str) -> None:
+    """Compute one stage, also where it is there, from what is there; only what it needs and is missing comes first."""
+    bench.runner.run([stage], again=[stage])
 
 
 def _all(bench: Workbench, asks: Asks) -> None:
@@ -22,6 +28,11 @@ def _all(bench: Workbench, asks: Asks) -> None:
 
 def _selected(bench: Workbench, asks: Asks) -> None:
     run_until(bench, bench.selection.stage)
+
+
+def _alone(bench: Workbench, asks: Asks) -> None:
+    assert bench.selection.stage is not None
+    run_stage(bench, bench.selection.stage)
 
 
 def _no_stage(bench: Workbench) -> str:
@@ -59,9 +70,18 @@ RUN_ACTIONS = (
         "run.to",
         "Run to the selected stage",
         "Run",
-        "Have the selected stage's result, and what it stands on.",
+        "Compute what is missing of the stages down to the selected one.",
         _selected,
         "F6",
+        first(_READY, _no_stage),
+    ),
+    Action(
+        "run.stage",
+        "Run the selected stage",
+        "Run",
+        "Compute the selected stage, once more if it is there, and what it needs only where that is missing.",
+        _alone,
+        "Shift+F6",
         first(_READY, _no_stage),
     ),
     Action("run.stop", "Stop", "Run", "Stop what runs; what is finished stays.", _stop, "Ctrl+.", _nothing_runs),

@@ -93,10 +93,15 @@ class Runner:
         """How far it is, None where nothing runs."""
         return None if self._work is None else self._work.at
 
-    def run(self, until: Collection[str] | None = None) -> bool:
+    def run(self, until: Collection[str] | None = None, again: Collection[str] = ()) -> bool:
         """Have the results of some stages, all by default, with the settings as they are now.
 
         Returns whether there was anything to do. Settings that change meanwhile count from the next run on.
+
+        Parameters
+        ----------
+        until : the stages that are wanted; what they are computed from is computed where it is not there
+        again : those of them that are computed although they are there
 
         Raises
         ------
@@ -109,10 +114,10 @@ class Runner:
             raise self.board.problem
         board, session = self.board, self.board.document.session
         wanted = board.names if until is None else tuple(until)
-        parts = shares(board.graph, board.keys, session.store, wanted)
+        parts = shares(board.graph, board.keys, session.store, wanted, again)
         if not parts:
             return False
-        job = Job(run_session, session, tuple(wanted), store=session.store)
+        job = Job(run_session, session, tuple(wanted), store=session.store, again=tuple(again))
         self._work = _Work(job, parts, self._expected(parts), since=self._clock())
         self._work.at = Running(text="starting", seconds_left=sum(self._work.expected.values()))
         self.changed.emit()
@@ -172,6 +177,7 @@ class Runner:
         elif event.state == "cached" and event.computed:
             work.expected.pop(event.stage, None)
             self.notes.pop(ref, None)
+            self.board.results.forget(ref.stage, ref.key)
             self.board.end()
             self.landed.emit(ref)
 

@@ -167,6 +167,15 @@ class Results:
         for one in unread:
             self.failed.emit(one)
 
+    def forget(self, stage: str, key: str) -> None:
+        """Look anew at a result that was computed once more."""
+        ref = Ref(stage, key)
+        self._entries.pop(ref, None)
+        self._written.pop(ref, None)
+        self._listed.pop(stage, None)
+        with self._lock:
+            self._held.pop(ref, None)
+
     def of(self, keys: Mapping[str, str]) -> StageResults:
         """The results of these keys, by stage."""
         return StageResults(self, keys)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from app.actions.run_actions import run_until
+from PySide6.QtCore import QTimer
+
+from app.actions.run_actions import run_stage, run_until
 from app.models import edits
 from app.models.fields import title
 from app.models.jobs import Running
@@ -22,7 +24,7 @@ class StagesBinder:
         bench.runner.changed.connect(self._ran)
         bench.runner.progressed.connect(self._progress)
         panel.run.connect(lambda name: self._run(name))
-        panel.run_to.connect(lambda name: self._run(name))
+        panel.run_to.connect(lambda name: self._run_to(name))
         panel.stop.connect(bench.runner.cancel)
         strip.stop.connect(bench.runner.cancel)
         panel.setting_changed.connect(self._set)
@@ -35,6 +37,10 @@ class StagesBinder:
         self.panel.set_stages(self.bench.board.cards)  # type: ignore[arg-type]  # cards have what the panel reads
 
     def _run(self, stage: str) -> None:
+        self.bench.selection.select(stage=stage)
+        self.bench.attempt(lambda: run_stage(self.bench, stage))
+
+    def _run_to(self, stage: str) -> None:
         self.bench.selection.select(stage=stage)
         self.bench.attempt(lambda: run_until(self.bench, stage))
 

@@ -27,6 +27,7 @@ def run_stages(
     until: Collection[str] | None = None,
     progress: Progress = silent,
     on_event: OnEvent = ignore,
+    again: Collection[str] = (),
 ) -> GraphRun:
     """Have the results of some stages, and of all that lead to them, in the session's store.
 
@@ -35,6 +36,7 @@ def run_stages(
     until : the stages that are wanted, None for all
     progress : told the fraction done, and what is found on the way
     on_event : told when a stage begins, ends, fails, or was in the store
+    again : the wanted stages that are computed although they are there
     """
     stages = graph_of(session)
     return run_graph(
@@ -45,6 +47,7 @@ def run_stages(
         until,
         progress=progress,
         on_event=on_event,
+        again=again,
     )
 
 
@@ -53,6 +56,7 @@ def run_session(
     until: Collection[str] | None = None,
     progress: Progress = silent,
     on_event: OnEvent = ignore,
+    again: Collection[str] = (),
 ) -> dict[str, str]:
     """``run_stages`` for a worker process: the keys come back, the results stay in the store."""
-    return dict(run_stages(session, until, progress, on_event).keys)
+    return dict(run_stages(session, until, progress, on_event, again).keys)

@@ -144,6 +144,7 @@ def run_graph(
     until: Collection[str] | None = None,
     progress: Progress = silent,
     on_event: OnEvent = ignore,
+    again: Collection[str] = (),
 ) -> GraphRun:
     """Have the results of the wanted stages in the store, computing only what is not there.
 
@@ -155,12 +156,14 @@ def run_graph(
     until : the stages whose results are wanted, all by default; what only leads to them is computed if needed
     progress : told the fraction of the stages that must run, each by its cost
     on_event : told when a stage begins, ends, fails, or was in the store
+    again : the wanted stages that are computed although they are there; what was there stays until then
     """
     keys = stage_keys(graph, sources, settings)
     runner = _Runner({stage.name: stage for stage in graph}, keys, sources, settings, store, progress, on_event)
     wanted = [name for name in keys if until is None or name in until]
     store.clean()
-    runner.shares = shares(graph, keys, store, wanted)
+    runner.again = frozenset(again)
+    runner.shares = shares(graph, keys, store, wanted, again)
     for name in wanted:
         runner.ensure(name)
     progress(1.0, "done")
@@ -168,7 +171,11 @@ def run_graph(
 
 
 def shares(
-    graph: Sequence[Stage], keys: Mapping[str, str], store: Store, wanted: Collection[str]
+    graph: Sequence[Stage],
+    keys: Mapping[str, str],
+    store: Store,
+    wanted: Collection[str],
+    again: Collection[str] = (),
 ) -> dict[str, tuple[float, float]]:
     """From where to where each stage that has to run takes the progress bar, in the order they run.
 
@@ -176,13 +183,16 @@ def shares(
     ----------
     keys : of every stage, as ``stage_keys`` gives them
     wanted : the stages whose results are wanted
+    again : those of them that are computed although they are there
     """
     stages = {stage.name: stage for stage in graph}
     missing: set[str] = set()
     frontier = list(wanted)
     while frontier:
         name = frontier.pop()
-        if name not in missing and name in stages and not store.has(name, keys[name]):
+        if name in missing or name not in stages:
+            continue
+        if name in again or not store.has(name, keys[name]):
             missing.add(name)
             frontier += stages[name].inputs
     total = sum(stages[name].cost for name in missing) or 1.0
@@ -228,13 +238,14 @@ class _Runner:
         self.events: dict[str, Event] = {}
         self.memory: dict[str, Any] = {}
         self.shares: Mapping[str, tuple[float, float]] = {}
+        self.again: frozenset[str] = frozenset()
 
     def ensure(self, name: str) -> None:
         """Have a stage's result in the store."""
         if name in self.events:
             return
         entry = self.store.entry(name, self.keys[name])
-        if entry is None:
+        if entry is None or name in self.again:
             self._compute(name)
         else:
             about = entry.about
@@ -273,6 +284,8 @@ class _Runner:
                 "seconds": seconds,
                 "headline": headline,
             }
+            if name in self.again:
+                self.store.discard(name, key)
             self.store.put(name, key, result, about)
         except Cancelled:
             self._tell(Event(name, "not run", key))

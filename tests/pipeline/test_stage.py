@@ -206,6 +206,17 @@ def test_what_a_stage_finds_on_the_way_arrives_with_its_name_and_key(tmp_path: P
     run_graph([stage], {}, {}, Store(tmp_path / "other"))  # who only hears fractions is not bothered
 
 
+def test_a_stage_is_computed_again_where_that_is_asked_for(work: Work) -> None:
+    work.go()
+    keys = dict(work.last.keys)
+    assert work.go(until=["double"], again=["double"]) == ["double"], "what it needs is there, and stays"
+    assert work.go(until=["join"], again=["total", "join"]) == ["join", "total"]
+    assert work.last.keys == keys
+    work.store.discard("read", keys["read"])
+    assert work.go(until=["double"], again=["double"]) == ["double", "read"]
+    assert shares(work.graph, keys, work.store, ["join"], ["join"]).keys() == {"join"}
+
+
 def test_only_what_has_to_run_takes_the_bar(tmp_path: Path) -> None:
     work = Work(tmp_path)
     costs = {"read": 1.0, "double": 2.0, "total": 3.0, "join": 4.0}

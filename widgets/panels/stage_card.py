@@ -38,7 +38,7 @@ class StageCard(QFrame):
 
     Signals
     -------
-    run(name), run_to(name) : this stage alone; this one and all it needs
+    run(name), run_to(name) : this stage, also where it is there; what is missing of all stages down to this one
     stop() : the run in progress
     setting_changed(name, field, value)
     earlier_chosen(name, key) : go back to this result
@@ -140,9 +140,12 @@ class StageCard(QFrame):
         self._headline.setText(data.headline)
         self._headline.setVisible(bool(data.headline))
         self._running.setVisible(data.state == "running")
-        for button, what in ((self.run_button, "this stage"), (self.run_to_button, "all that is missing up to here")):
+        there = "once more: its result is there already" if data.state == "cached" else "now"
+        alone = f"Compute this stage {there}. What it is computed from is computed only where it is missing."
+        down = "Compute what is missing of the stages from the first down to this one. What is there stays as it is."
+        for button, what in ((self.run_button, alone), (self.run_to_button, down)):
             button.setEnabled(not data.why_not)
-            button.setToolTip(data.why_not or f"Compute {what}")
+            button.setToolTip(data.why_not or what)
         self.form.set_fields(data.fields)
         self.form.setVisible(bool(data.fields))
         self._show_earlier(data.earlier)

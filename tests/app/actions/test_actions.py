@@ -13,7 +13,9 @@ import pytest
 from app.actions import ACTIONS, Actions
 from app.actions.session_actions import may_close, open_path
 from app.cli_commands import DEMO_MARKERS, DEMO_VIDEO
+from app.models import edits
 from app.models.home import Home
+from app.models.stages import states_of
 from app.models.workbench import Said, Workbench
 from solver.pipeline.session import Session, session_folder
 
@@ -246,8 +248,78 @@ def test_running_what_is_there_says_so(actions: Actions, solved: Workbench, said
     assert "there for these settings already" in said[-1].what
     solved.selection.select(stage="fit")
     assert actions.trigger("run.to")
-    assert said[-1].what.startswith("Fit is there")
+    assert said[-1].what.startswith("Everything up to Fit is there")
     assert actions.why_not("run.stop") == "nothing runs"
+
+
+def test_a_stage_is_run_alone_or_with_all_before_it(actions: Actions, solved: Workbench) -> None:
+    board, ran = solved.board, list[str]()
+    solved.runner.landed.connect(lambda ref: ran.append(ref.stage))
+
+    def run(action: str, stage: str) -> list[str]:
+        ran.clear()
+        solved.selection.select(stage=stage)
+        assert actions.trigger(action)
+        while solved.runner.running:
+            solved.tick()
+            time.sleep(0.005)
+        return sorted(ran, key=board.names.index)
+
+    before = np.asarray(board.current["angles"].degrees)
+    assert run("run.stage", "angles") == ["angles"], "it is computed once more, and nothing else"
+    assert np.array_equal(board.current["angles"].degrees, before, equal_nan=True)
+    assert set(states_of(board).values()) == {"cached"}
+    solved.apply(edits.set_value(solved.document.session, "prior", "rate", 25.0))
+    solved.apply(edits.set_value(solved.document.session, "segment", "min_overlap", 25))
+    assert run("run.stage", "segment") == ["segment"], "the prior is missing, but the groups do not need it"
+    solved.document.undo()
+    solved.apply(edits.set_value(solved.document.session, "segment", "min_overlap", 26))
+    assert run("run.to", "segment") == ["prior", "sync", "segment"], "what is missing above it in the list, too"
+
+
+def test_markers_are_moved_to_a_group_and_put_back(
+    actions: Actions, asks: Answers, solved: Workbench, said: list[Said]
+) -> None:
+    groups = solved.board.current["segment"].clusters
+    one = int(np.flatnonzero(groups == 0)[0])
+    assert "no marker is selected" in actions.why_not("groups.move")
+    solved.selection.select_markers([one])
+    assert actions.trigger("groups.move")
+    assert np.array_equal(solved.board.current["segment"].clusters, groups), "nobody said where to"
+    asks.answers["Move the selected markers to"] = 1
+    assert actions.trigger("groups.move")
+    moved = solved.board.current["segment"].clusters
+    host = int(np.flatnonzero(groups == 2)[0])  # the second of those it is not in
+    assert moved[one] == moved[host], (moved, groups)
+    assert actions.trigger("groups.leave_out")
+    assert solved.board.current["segment"].clusters[one] == -1
+    assert actions.trigger("groups.take_in")
+    assert solved.board.current["segment"].clusters[one] >= 0
+    for _ in range(3):
+        assert actions.trigger("edit.undo")
+    assert np.array_equal(solved.board.current["segment"].clusters, groups)
+
+
+def test_the_scene_is_set_by_keys(actions: Actions, solved: Workbench) -> None:
+    display = solved.display
+    display.show("body", False)
+    actions.trigger("body.less")
+    assert (display.opacity, display.layers["body"]) == (0.5, True)
+    for _ in range(9):
+        actions.trigger("body.more")
+    assert display.opacity == 1.0
+    actions.trigger("trails.longer")
+    assert (display.trail_s, display.layers["trails"]) == (0.6, True)
+    for _ in range(9):
+        actions.trigger("trails.shorter")
+    assert (display.trail_s, display.layers["trails"]) == (0.0, False)
+    actions.trigger("tool.select")
+    assert display.boxing and actions.is_on("tool.select")
+    solved.remember()
+    assert solved.document.view["display"]["boxing"] is True
+    keys = [key for action in ACTIONS for key in action.keys]
+    assert len(keys) == len(set(keys)), "a key that means two things does neither"
+    assert {f"Ctrl+{k}" for k in range(7)} <= {*keys}
 
 
 def test_saving_asks_where_the_first_time(actions: Actions, asks: Answers, bench: Workbench, tmp_path: Path) -> None:
