@@ -76,6 +76,7 @@ class Trained:
     figures : of that look
     steps, seconds : in all, before and after resuming
     history : a row each look: step, seconds, loss terms, figures
+    stopped : whether it was told to end before its time; its checkpoint is still there then
     """
 
     params: Params
@@ -83,6 +84,12 @@ class Trained:
     steps: int
     seconds: float
     history: tuple[dict[str, float], ...]
+    stopped: bool = False
+
+
+def never() -> bool:
+    """Go on."""
+    return False
 
 
 @dataclass
@@ -109,6 +116,7 @@ def train(
     checkpoint: Path | None = None,
     what: str = "",
     progress: Progress = silent,
+    enough: Callable[[], bool] = never,
 ) -> Trained:
     """Train from ``params`` on, which are not changed.
 
@@ -117,6 +125,7 @@ def train(
     loss, judge : see there; ``judge`` is called without gradients
     checkpoint : file that is written from time to time, taken up where it is there, and removed at the end
     what : digest of what is trained on what; a checkpoint of anything else is refused
+    enough : asked before every step; True ends the training, the best so far is kept
 
     Raises
     ------
@@ -133,8 +142,12 @@ def train(
         if checkpoint is not None and checkpoint.is_file():
             _resume(checkpoint, what, state, optimiser)
         started, saved, before = time.monotonic(), time.monotonic(), state.seconds
+        stopped = False
         try:
             while _share(state, settings) < 1 and not _stale(state, settings):
+                if enough():
+                    stopped = True
+                    break
                 rate = _rate(state, settings)
                 for group in optimiser.param_groups:
                     group["lr"] = rate
@@ -164,10 +177,12 @@ def train(
             raise
         if state.step % settings.check or not state.history:
             _look(state, judge)
-    if checkpoint is not None:
+        if stopped and checkpoint is not None:
+            _save(checkpoint, what, state, optimiser)
+    if checkpoint is not None and not stopped:
         checkpoint.unlink(missing_ok=True)
     progress(1.0, f"{state.step} steps, held out {state.figures['score']:.4g}")
-    return Trained(state.best, state.figures, state.step, state.seconds, tuple(state.history))
+    return Trained(state.best, state.figures, state.step, state.seconds, tuple(state.history), stopped)
 
 
 def _share(state: _State, settings: TrainSettings) -> float:

@@ -248,16 +248,48 @@ def fit(
     progress: Progress = silent,
 ) -> FittedMotion:
     """The chosen answer carried to every frame."""
-    row = 0 if settings.candidate is None else settings.candidate
-    if not 0 <= row < len(ranked.candidates):
-        raise InputError(
-            f"is {row}", "the pinned candidate", f"pin one of the {len(ranked.candidates)} candidates, counted from 0"
-        )
+    row = chosen_row(ranked, settings)
     chosen = ranked.candidates[row]
     used = replace(seen, markers=seen.markers[:, found.markers])
     frames = found.many if chosen.refined else found.few
     state, surface, weights = _settled(body, used.at(frames), landmarks, chosen, settings)
     pose = every_frame(body, used, landmarks, frames, state, surface, weights, progress)
+    return fitted_motion(body, seen, found, ranked, settings, state, pose, time)
+
+
+def chosen_row(ranked: Orientation, settings: FitSettings) -> int:
+    """Row of the candidate that goes on: the one that is pinned, else the best.
+
+    Raises
+    ------
+    InputError : there is no such candidate
+    """
+    row = 0 if settings.candidate is None else settings.candidate
+    if not 0 <= row < len(ranked.candidates):
+        raise InputError(
+            f"is {row}", "the pinned candidate", f"pin one of the {len(ranked.candidates)} candidates, counted from 0"
+        )
+    return row
+
+
+def fitted_motion(
+    body: Body,
+    seen: Observations,
+    found: Localization,
+    ranked: Orientation,
+    settings: FitSettings,
+    state: State,
+    pose: Pose,
+    time: np.ndarray,
+) -> FittedMotion:
+    """What a fit leaves, of the poses of all frames.
+
+    Parameters
+    ----------
+    state : of the keyframes: where the markers sit, and the camera
+    """
+    row = chosen_row(ranked, settings)
+    chosen = ranked.candidates[row]
     links = forward(body, pose)
     count = seen.markers.shape[1]
     placed = np.full((len(time), count, 3), np.nan)
@@ -295,18 +327,23 @@ def _settled(
 ) -> tuple[State, Surface, Weights]:
     """The keyframes once more, the video trusted as far as it turned out to be right."""
     problem, weights = Problem(body, seen, landmarks), settings.weights()
+    state, surface = state_of(chosen, seen)
+    if problem.in_image.any():
+        return state, surface, weights
+    weights = trusted(seen, state, believed(weights))
+    state, surface, _ = descend(problem, state, surface, FINE[-1:], weights)
+    return state, surface, weights
+
+
+def state_of(chosen: Candidate, seen: Observations) -> tuple[State, Surface]:
+    """A candidate as a fit goes on with it; ``seen`` are its keyframes."""
     state = State(
         Pose(chosen.rotations, chosen.trans, chosen.betas),
         Points(chosen.rest, chosen.dirs, chosen.weights),
         _camera_of(chosen.camera, seen.lab_centre),
         chosen.bias,
     )
-    surface = Surface(chosen.surface, chosen.normal)
-    if problem.in_image.any():
-        return state, surface, weights
-    weights = trusted(seen, state, believed(weights))
-    state, surface, _ = descend(problem, state, surface, FINE[-1:], weights)
-    return state, surface, weights
+    return state, Surface(chosen.surface, chosen.normal)
 
 
 def _camera_of(camera: CameraResult, centre: np.ndarray) -> Camera:

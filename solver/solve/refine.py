@@ -27,6 +27,7 @@ def every_frame(
     surface: Surface,
     base: Weights,
     progress: Progress = silent,
+    start: Pose | None = None,
 ) -> Pose:
     """Poses of all T frames.
 
@@ -35,9 +36,10 @@ def every_frame(
     seen : all T frames
     keyframes : (N,) ascending frame numbers that ``fitted`` was solved at
     fitted : the keyframes' solution
+    start : poses of all frames to begin with; None carries the keyframes over
     """
     frames = len(seen.markers)
-    start = carried_over(body, seen, keyframes, fitted)
+    start = start or carried_over(body, seen, keyframes, fitted)
     held = replace(base, free_shape=False, free_placement=False, free_camera=False, free_bias=False)
     rotations, trans = start.rotations.copy(), start.trans.copy()
 
@@ -69,8 +71,12 @@ def carried_over(body: Body, seen: Observations, keyframes: np.ndarray, fitted: 
     correction = np.swapaxes(video[keyframes], -1, -2) @ fitted.pose.rotations
     rotations = video @ slerp(correction, keyframes.astype(float), frames)
     steps = [np.interp(frames, keyframes, fitted.pose.trans[:, k]) for k in range(3)]
-    pose = Pose(rotations, np.stack(steps, 1), fitted.pose.betas)
-    placed = place_points(fitted.placement, forward(body, pose), pose.betas)
+    return set_on_markers(body, seen, fitted.placement, Pose(rotations, np.stack(steps, 1), fitted.pose.betas))
+
+
+def set_on_markers(body: Body, seen: Observations, placement: Points, pose: Pose) -> Pose:
+    """The same poses, moved so that in each frame the markers are where they should be on average."""
+    placed = place_points(placement, forward(body, pose), pose.betas)
     present = np.isfinite(seen.markers).all(axis=2)
     gap = np.where(present[..., None], seen.markers - placed, 0.0).sum(1) / np.maximum(present.sum(1), 1)[:, None]
     return replace(pose, trans=pose.trans + gap)
