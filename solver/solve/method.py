@@ -13,6 +13,7 @@ from solver.localize import Hypothesis, Search, hypotheses
 from solver.progress import Progress, silent
 from solver.rotations import log_so3
 from solver.solve.bundle import FINE, Fit, descend, relax
+from solver.solve.ending import motion_from
 from solver.solve.kinematics import Points, Pose, forward, place_points
 from solver.solve.placement import Skin
 from solver.solve.problem import Problem
@@ -289,25 +290,17 @@ def fitted_motion(
     state : of the keyframes: where the markers sit, and the camera
     """
     row = chosen_row(ranked, settings)
-    chosen = ranked.candidates[row]
-    links = forward(body, pose)
-    count = seen.markers.shape[1]
-    placed = np.full((len(time), count, 3), np.nan)
-    placed[:, found.markers] = place_points(state.placement, links, pose.betas)
-    joint, vertex = np.full(count, -1), np.full(count, -1)
-    joint[found.markers], vertex[found.markers] = _sites(body, state)
+    camera = ranked.candidates[row].camera
     pinned = settings.candidate is not None
-    return FittedMotion(
-        time=time,
-        rotations=pose.rotations,
-        trans=pose.trans,
-        betas=pose.betas,
-        joints=links.place,
-        marker_joint=joint,
-        marker_vertex=vertex,
-        placed=placed,
-        residual=np.linalg.norm(seen.markers - placed, axis=2),
-        camera=_written(state.camera, chosen.camera.image_size, chosen.camera.reprojection_px),
+    return motion_from(
+        body,
+        seen.markers,
+        time,
+        pose,
+        found.markers,
+        state.placement,
+        _sites(body, state),
+        camera=_written(state.camera, camera.image_size, camera.reprojection_px),
         chosen=row,
         confidence=1.0 if pinned else ranked.confidence,
         warnings=(f"Candidate {row} was pinned by hand.",) if pinned else ranked.warnings,

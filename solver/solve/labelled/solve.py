@@ -16,7 +16,8 @@ from solver.errors import InputError
 from solver.markers import Markers
 from solver.progress import Progress, part_of, silent
 from solver.solve.bundle import Phase, descend
-from solver.solve.kinematics import Pose, forward, place_points
+from solver.solve.ending import motion_from
+from solver.solve.kinematics import Pose
 from solver.solve.labelled.anchored import AnchoredProblem
 from solver.solve.labelled.every_frame import every_frame
 from solver.solve.labelled.places import FEWEST, Places, first_guess, places_of
@@ -157,25 +158,15 @@ def _first_stage(
 
 
 def _motion(body: Body, markers: Markers, places: Places, state: State, pose: Pose) -> FittedMotion:
-    count = len(markers.labels)
-    links = forward(body, pose)
-    placed = np.full((len(markers.positions), count, 3), np.nan)
-    placed[:, places.markers] = place_points(state.placement, links, pose.betas)
-    joint, vertex = np.full(count, -1), np.full(count, -1)
-    joint[places.markers] = places.bone
-    vertex[places.markers] = Skin(body, pose.betas).nearest_vertex(state.placement.shaped(pose.betas))
-    return FittedMotion(
-        time=markers.time,
-        rotations=pose.rotations,
-        trans=pose.trans,
-        betas=pose.betas,
-        joints=links.place,
-        marker_joint=joint,
-        marker_vertex=vertex,
-        placed=placed,
-        residual=np.linalg.norm(markers.positions - placed, axis=2),
+    vertex = Skin(body, pose.betas).nearest_vertex(state.placement.shaped(pose.betas))
+    return motion_from(
+        body,
+        markers.positions,
+        markers.time,
+        pose,
+        places.markers,
+        state.placement,
+        (places.bone, vertex),
         camera=CameraResult(np.eye(3), np.zeros(3), 1.0, (0, 0), float("nan")),
-        chosen=0,
-        confidence=1.0,
         warnings=places.notes,
     )

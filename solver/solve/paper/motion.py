@@ -9,7 +9,8 @@ from solver.errors import InputError
 from solver.progress import Progress, silent
 from solver.rotations import kabsch, slerp
 from solver.solve.bundle import locate_camera
-from solver.solve.kinematics import Points, Pose, forward, place_points
+from solver.solve.ending import motion_from
+from solver.solve.kinematics import Points, Pose
 from solver.solve.paper.results import BodyState, PaperLocalization, PaperSolve
 from solver.solve.paper.sequence import sequence_of
 from solver.solve.paper.settings import PaperFitSettings
@@ -81,23 +82,15 @@ def fitted_motion(
     warnings: tuple[str, ...],
 ) -> FittedMotion:
     """A motion whose markers (T, M, 3) m stand ``offset`` m off the vertices of those that were used (U,)."""
-    count = markers.shape[1]
-    links = forward(body, pose)
     placement, _ = Skin(body, pose.betas).on_vertices(vertex, offset)
-    placed = np.full((len(time), count, 3), np.nan)
-    placed[:, used] = place_points(placement, links, pose.betas)
-    marker_joint, marker_vertex = np.full(count, -1), np.full(count, -1)
-    marker_joint[used], marker_vertex[used] = body.weights[vertex].argmax(axis=1), vertex
-    return FittedMotion(
-        time=time,
-        rotations=pose.rotations,
-        trans=pose.trans,
-        betas=pose.betas,
-        joints=links.place,
-        marker_joint=marker_joint,
-        marker_vertex=marker_vertex,
-        placed=placed,
-        residual=np.linalg.norm(markers - placed, axis=2),
+    return motion_from(
+        body,
+        markers,
+        time,
+        pose,
+        used,
+        placement,
+        (body.weights[vertex].argmax(axis=1), vertex),
         camera=camera,
         chosen=chosen,
         confidence=confidence,
