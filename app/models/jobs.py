@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from statistics import median
@@ -51,6 +52,7 @@ class _Work:
     expected: dict[str, float]
     last: Ref | None = None
     since: float = 0.0
+    waiting: deque[Message] = field(default_factory=deque)
     at: Running = field(default_factory=Running)
 
 
@@ -127,9 +129,13 @@ class Runner:
         """Pass on what has arrived; to be called some twenty times a second while something runs."""
         if self._work is None:
             return
-        before = self._work.at
-        for message in self._work.job.poll():
+        before, waiting = self._work.at, self._work.waiting
+        waiting.extend(self._work.job.poll())
+        while waiting and self.running:
+            message = waiting.popleft()
             self._take(message)
+            if isinstance(message, Event):
+                break  # much is drawn anew then: let that be done before the next one
         if not self.running:
             return
         self._estimate()
@@ -140,11 +146,12 @@ class Runner:
         """End the run; what it has finished stays."""
         if self._work is None:
             return
-        job = self._work.job
+        job, waiting = self._work.job, self._work.waiting
         job.cancel()
         while self.running:  # the last message is on its way
-            for message in job.poll():
-                self._take(message)
+            waiting.extend(job.poll())
+            while waiting:
+                self._take(waiting.popleft())
             time.sleep(0.001)
 
     def _take(self, message: Message) -> None:

@@ -103,8 +103,9 @@ class BodyTrack:
 
     def places_over(self, times: np.ndarray) -> np.ndarray:
         """(n, U, 3) m, where the markers that have a place belong at several times."""
-        points = self.placement or self.skin
-        return np.stack([points.at(self.pose(float(time))) for time in times])
+        poses = [self.pose(float(time)) for time in times]
+        rotations, trans = np.stack([pose.rotations for pose in poses]), np.stack([pose.trans for pose in poses])
+        return (self.placement or self.skin).over(rotations, trans)
 
     def _spread(self, points: np.ndarray, count: int) -> np.ndarray:
         out = np.full((count, 3), np.nan)
@@ -138,6 +139,11 @@ def of_candidate(
         candidate.vertex,
         placement,
     )
+
+
+def belongs_to(candidate: Candidate, found: Localization | PaperLocalization) -> bool:
+    """Whether a candidate can have been made from a localization, and not from another with other settings."""
+    return len(keyframes_of(candidate, found)) == len(candidate.trans) and len(found.markers) == len(candidate.vertex)
 
 
 def keyframes_of(candidate: Candidate, found: Localization | PaperLocalization) -> np.ndarray:

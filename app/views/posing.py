@@ -67,6 +67,15 @@ class PosedPoints:
             points += (blended.reshape(-1, 3, 3) @ bent)[..., 0]
         return points
 
+    def over(self, rotations: np.ndarray, trans: np.ndarray) -> np.ndarray:
+        """(N, V, 3) m, float32: the points in several poses, (N, 24, 3, 3) and (N, 3) m."""
+        if self.correctives is not None:
+            return np.stack([self.at(Pose(*pose)) for pose in zip(rotations, trans)])
+        turn, place = chain(rotations, self.rest_joints, trans)
+        shift = place - (turn @ self.rest_joints[..., None])[..., 0]
+        motion = np.concatenate([turn, shift[..., None]], axis=-1).transpose(0, 1, 3, 2)  # (N, 24, 4, 3)
+        return np.asarray(self.features @ motion.reshape(len(trans), -1, 3).astype(np.float32))
+
     def joints(self, pose: Pose) -> np.ndarray:
         """(24, 3) m, the joint centres in one pose."""
         return self._links(pose)[1]

@@ -15,16 +15,18 @@ from app.window.shown import Shown
 from widgets import palette
 from widgets.panels.hypotheses import HypothesesView
 from widgets.scene import Scene3D
-
-_SIZE = 320, 240
+from widgets.scene.portraits import Portraits
 
 
 class HypothesesBinder:
-    """Fills the cards. The pictures are drawn one by one in a scene of their own, which is kept."""
+    """Fills the cards. The pictures are drawn one by one, each in its turn of the event loop."""
 
-    def __init__(self, widget: HypothesesView, bench: Workbench, shown: Shown, ghosts: Ghosts) -> None:
+    def __init__(self, widget: HypothesesView, bench: Workbench, shown: Shown, ghosts: Ghosts, scene: Scene3D) -> None:
         self.widget, self.bench, self.shown, self.ghosts = widget, bench, shown, ghosts
-        self._scene: Scene3D | None = None
+        self._scene = scene
+        self._portraits: Portraits | None = None
+        self._blank = QImage(4, 3, QImage.Format.Format_RGB32)
+        self._blank.fill(0x888888)
         self._picture: HypothesesPicture | None = None
         self._images: dict[int, QImage] = {}
         self._of: object = None
@@ -85,25 +87,12 @@ class HypothesesBinder:
 
     def _draw(self, row: int) -> QImage:
         track, markers = self.ghosts.candidate_track(row), self.shown.markers
-        if self._scene is None:
-            self._scene = Scene3D()
-            self._scene.resize(*_SIZE)
-            for layer in ("axes", "legend"):
-                self._scene.show_layer(layer, False)
-        scene = self._scene
-        if track is None or markers is None or scene.problem is not None:
-            blank = QImage(*_SIZE, QImage.Format.Format_RGB32)
-            blank.fill(0x888888)
-            return blank
+        if self._portraits is None:
+            self._portraits = self._scene.portraits()
+        if track is None or markers is None:
+            return QImage(self._blank)
         time = float(track.times[len(track.times) // 2])
         frame = int(np.clip(round((time - markers.time[0]) * markers.rate), 0, len(markers.positions) - 1))
-        vertices = track.vertices(time, "coarse")
-        colour = palette.categorical(12)[row % 12]
-        scene.set_mesh("body", vertices, track.faces("coarse"), colour, 0.55)
-        scene.set_bones("skeleton", track.joints(time), BONE_EDGES, colour)
-        points = markers.positions[frame]
-        scene.set_markers(points, np.tile(np.array([[200, 30, 60]], np.uint8), (len(points), 1)))
-        scene.set_floor(0.0)
-        scene.view_from("isometric")
-        scene.frame(vertices)
-        return scene.image(1.0, _SIZE)
+        vertices, joints = track.vertices(time, "coarse"), track.joints(time)
+        colour, points = palette.categorical(12)[row % 12], markers.positions[frame]
+        return self._portraits.draw(vertices, track.faces("coarse"), joints, BONE_EDGES, points, colour)

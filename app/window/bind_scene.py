@@ -7,17 +7,20 @@ from typing import Any
 import numpy as np
 from PySide6.QtCore import Qt
 
-from app.models.workbench import Workbench
+from app.models.workbench import Said, Workbench
 from app.views import scene
+from app.views.bodies import BodyTrack
 from app.views.colours import Legend
-from app.views.posing import BONE_EDGES, Detail
+from app.views.posing import BONE_EDGES
 from app.window.ghosts import Ghosts
 from app.window.keys import how
 from app.window.shown import Shown
-from widgets import palette
+from widgets import palette, theme
 from widgets.scene import ColourBar, Scene3D
 
 _NONE = np.zeros((0, 3))
+TROUBLE_REMEDY = "all else works on; save the session, and open it again if it does not come back by itself"
+"""What to do where a view cannot be drawn."""
 
 
 class SceneBinder:
@@ -32,6 +35,7 @@ class SceneBinder:
         self.widget, self.bench, self.shown, self.ghosts = widget, bench, shown, ghosts
         self.clusters: np.ndarray | None = None
         self._framed = False
+        self._body: tuple[object, ...] | None = None
         self._legend: Legend | None = None
         self._ghost_layers: set[str] = set()
         bench.clock.moved.connect(lambda time: self.draw())
@@ -44,6 +48,7 @@ class SceneBinder:
         widget.marker_clicked.connect(lambda marker, held: bench.selection.select_markers([marker], how(held)))
         widget.markers_boxed.connect(lambda markers, held: bench.selection.select_markers(markers, _box_how(held)))
         widget.bone_clicked.connect(lambda layer, bone, held: self._bone(bone, held))
+        widget.trouble.connect(lambda text: bench.say(Said("error", text, remedy=TROUBLE_REMEDY)))
         widget.background_clicked.connect(lambda held: None if _held(held) else bench.selection.clear())
         self._display(frozenset({"follow"}))
 
@@ -79,12 +84,11 @@ class SceneBinder:
         tracks = self.shown.tracks
         assert tracks is not None
         hidden = track is None or self.ghosts.replaces_body
-        detail: Detail = "coarse" if self.bench.clock.playing else "full"
         if hidden or not display.layers["body"]:
-            widget.set_mesh("body", None, _NONE)
+            self._clear_body()
         else:
             assert track is not None
-            widget.set_mesh("body", track.vertices(time, detail), track.faces(detail), opacity=display.opacity)
+            self._show_body(track, time, display.opacity)
         joints = None if hidden or not display.layers["skeleton"] else track.joints(time)  # type: ignore[union-attr]
         widget.set_bones("skeleton", joints, BONE_EDGES, self._bone_colours())
         if hidden or not display.layers["links"]:
@@ -94,12 +98,24 @@ class SceneBinder:
             lines = scene.ties(tracks, track, frame)
             widget.set_lines("links", lines.start, lines.end)
 
+    def _show_body(self, track: BodyTrack, time: float, opacity: float) -> None:
+        """The coarse mesh, and every vertex as soon as the clock rests; as it is where it is this body already."""
+        wanted = track, time, opacity, theme.colours()
+        if self._body is None or any(a is not b and a != b for a, b in zip(wanted, self._body)):
+            self._body = wanted
+            self.widget.set_mesh(
+                "body", track.vertices(time, "coarse"), track.faces("coarse"), opacity=opacity,
+                finer=lambda: (track.vertices(time, "full"), track.faces("full")),
+            )  # fmt: skip
+
+    def _clear_body(self) -> None:
+        self._body = None
+        self.widget.set_mesh("body", None, _NONE)
+
     def _bone_colours(self) -> Any:
         bone = self.bench.selection.bone
         if bone is None:
             return None
-        from widgets import theme
-
         colours = np.tile(np.array(theme.colours().bone, dtype=np.uint8), (len(BONE_EDGES), 1))
         colours[BONE_EDGES[:, 0] == bone] = palette.SELECTED
         return colours
@@ -130,7 +146,7 @@ class SceneBinder:
 
     def _clear(self) -> None:
         self.widget.set_markers(_NONE, np.zeros((0, 3), np.uint8))
-        self.widget.set_mesh("body", None, _NONE)
+        self._clear_body()
         self.widget.set_bones("skeleton", None, BONE_EDGES)
         self.widget.set_lines("links", None, None)
         self.widget.set_legend("", None)

@@ -20,6 +20,8 @@ class StagesBinder:
     def __init__(self, panel: StagePanel, strip: ProgressStrip, bench: Workbench) -> None:
         self.panel, self.strip, self.bench = panel, strip, bench
         self._stage = ""
+        self._filling = QTimer(panel, singleShot=True, interval=0)  # many changes at once are shown once
+        self._filling.timeout.connect(self._fill)
         bench.board.changed.connect(self.fill)
         bench.runner.changed.connect(self._ran)
         bench.runner.progressed.connect(self._progress)
@@ -33,7 +35,10 @@ class StagesBinder:
         panel.opened.connect(lambda name, is_open: bench.selection.select(stage=name) if is_open else None)
 
     def fill(self) -> None:
-        """Show how every stage stands."""
+        """Show how every stage stands, as soon as all has changed that changes now."""
+        self._filling.start()
+
+    def _fill(self) -> None:
         self.panel.set_stages(self.bench.board.cards)  # type: ignore[arg-type]  # cards have what the panel reads
 
     def _run(self, stage: str) -> None:

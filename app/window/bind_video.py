@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from app.models.frames import VideoFrame
-from app.models.workbench import Workbench
+from app.models.workbench import Said, Workbench
 from app.views import scene, video
 from app.views.posing import BONE_EDGES
+from app.window.bind_scene import TROUBLE_REMEDY
 from app.window.keys import how
 from app.window.shown import Shown
 from solver.sync import Sync
@@ -29,7 +30,7 @@ class VideoBinder:
         bench.opened.connect(self._opened)
         shown.changed.connect(lambda stages: self.draw())
         widget.marker_clicked.connect(lambda marker, held: bench.selection.select_markers([marker], how(held)))
-        self._last: tuple[object, ...] = ()
+        widget.trouble.connect(lambda text: bench.say(Said("error", text, remedy=TROUBLE_REMEDY)))
 
     def draw(self) -> None:
         """Show the clock's moment."""

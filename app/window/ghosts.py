@@ -115,6 +115,8 @@ class Ghosts:
         if row is None or ranked is None or found is None or markers is None or row >= len(ranked.candidates):
             return None
         own = ranked.candidates[row]
+        if not bodies.belongs_to(own, found):
+            return None  # the localization has been run anew, the orientation not yet
         return self.shown.once(
             f"candidate {row}", (own, found, markers), lambda: bodies.of_candidate(self.shown.body, own, found, markers)
         )

@@ -30,6 +30,7 @@ from app.window.bind_timelines import TimelinesBinder
 from app.window.bind_transport import TransportBinder
 from app.window.bind_video import VideoBinder
 from app.window.bind_welcome import WelcomeBinder
+from app.window.collecting import Collecting
 from app.window.docks import Docks, Panel
 from app.window.ghosts import Ghosts
 from app.window.group_menu import SceneMenu
@@ -96,7 +97,9 @@ class MainWindow(QMainWindow):
         self._remembering.timeout.connect(self.remember)
         self._remembering.start()
         self._remembered: object = None
+        self._collecting = Collecting(self, lambda: bench.busy)
         self._opened()
+        self._collecting.start()
 
     def _make_widgets(self) -> None:
         self.scene, self.video, self.timelines = Scene3D(), VideoView(), Timelines()
@@ -143,7 +146,7 @@ class MainWindow(QMainWindow):
             MessagesBinder(self.messages, bench),
             AffinityBinder(self.affinity, self.pair, bench, shown, scene),
             CandidatesBinder(self.candidates, bench, shown, ghosts),
-            HypothesesBinder(self.hypotheses, bench, shown, ghosts),
+            HypothesesBinder(self.hypotheses, bench, shown, ghosts, self.scene),
             ConvergenceBinder(self.convergence, bench, shown, ghosts),
             MarkersBinder(self.markers, bench, shown),
             AnglesBinder(self.angles, bench, shown),
@@ -242,6 +245,7 @@ class MainWindow(QMainWindow):
         self.remember()
         self._timer.stop()
         self._remembering.stop()
+        self._collecting.stop()
         self.bench.close()
         event.accept()
 

@@ -6,6 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QToolButton, QWidget
 
 from widgets.icons import icon
+from widgets.panels.bar import show_part
 from widgets.panels.stage_data import StageProgress, left
 
 
@@ -45,10 +46,7 @@ class ProgressStrip(QWidget):
         if progress is None:
             self.label.setText(title)
             return
-        self.bar.setRange(0, 0 if progress.part is None else 1000)
-        if progress.part is not None:
-            self.bar.setValue(round(1000 * progress.part))
-            self.bar.setFormat(f"{100 * progress.part:.0f} %")
+        show_part(self.bar, progress.part)
         parts = [progress.text, "" if progress.seconds_left is None else left(progress.seconds_left)]
         said = ", ".join(part for part in parts if part)
         self.label.setText(": ".join(part for part in (title, said) if part))

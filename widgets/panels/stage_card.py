@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from widgets.icons import icon
+from widgets.panels.bar import show_part
 from widgets.panels.fields import SettingsForm
 from widgets.panels.stage_data import MEANING, EarlierResult, StageData, StageProgress, duration, left
 from widgets.theme import colours
@@ -62,6 +63,7 @@ class StageCard(QFrame):
         self.setBackgroundRole(QPalette.ColorRole.AlternateBase)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self._data = StageData(name, name)
+        self._shown: StageData | None = None
         self._icon, self._title, self._state, self._seconds = QLabel(), QLabel(), QLabel(), QLabel()
         self._headline = QLabel()
         self._headline.setWordWrap(True)
@@ -129,7 +131,11 @@ class StageCard(QFrame):
 
     def set_data(self, data: StageData) -> None:
         """Show how the stage stands."""
-        self._data = data
+        if data == self._shown:
+            if self.is_open():
+                self.form.set_fields(data.fields)  # a value that was not taken gives way to the one in force
+            return
+        self._data = self._shown = data
         self.setAccessibleName(f"{data.title}: {data.state}")
         self._title.setText(data.title)
         self._title.setToolTip(data.help)
@@ -153,10 +159,7 @@ class StageCard(QFrame):
 
     def set_progress(self, progress: StageProgress) -> None:
         """Show how far it is."""
-        self.bar.setRange(0, 0 if progress.part is None else 1000)
-        if progress.part is not None:
-            self.bar.setValue(round(1000 * progress.part))
-            self.bar.setFormat(f"{100 * progress.part:.0f} %")
+        show_part(self.bar, progress.part)
         parts = [progress.text, "" if progress.seconds_left is None else left(progress.seconds_left)]
         self._left.setText(", ".join(part for part in parts if part))
         self._left.setVisible(bool(self._left.text()))

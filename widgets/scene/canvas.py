@@ -24,16 +24,23 @@ _FAR = 80.0  # m
 class Canvas:
     """One scene, drawn off screen.
 
+    Parameters
+    ----------
+    beside : another canvas, whose window of VTK this one draws in too, each at its time: a second window would be a
+        second context of OpenGL, and VTK is not safe with those
+
     Attributes
     ----------
     software : whether a processor draws; smoothed edges then cost as many pictures as are averaged
     """
 
-    def __init__(self) -> None:
-        self._window = vtkRenderWindow()
-        self._window.SetOffScreenRendering(1)
-        self._window.SetMultiSamples(0)
-        self._window.SetSize(64, 64)
+    def __init__(self, beside: Canvas | None = None) -> None:
+        self._window: Any = vtkRenderWindow() if beside is None else beside._window
+        if beside is None:
+            self._window.SetOffScreenRendering(1)
+            self._window.SetMultiSamples(0)
+            self._window.SetSize(64, 64)
+        self.software = True
         self.renderer = vtkRenderer()
         self.renderer.GradientBackgroundOn()
         self.renderer.SetUseOIT(False)  # culled meshes look as well without, at two thirds of the time
@@ -47,6 +54,9 @@ class Canvas:
             self.renderer.AddLight(lamp)
         self._window.AddRenderer(self.renderer)
         self._bytes: Any = vtkUnsignedCharArray()
+        if beside is not None:
+            self.software = beside.software
+            return
         self._window.Render()
         report = str(self._window.ReportCapabilities()).lower()
         self.software = any(word in report for word in SOFTWARE)
@@ -62,6 +72,8 @@ class Canvas:
         """The picture (height, width, 4) uint8, moved by a part of a pixel."""
         if tuple(self._window.GetSize()) != (width, height):
             self._window.SetSize(width, height)
+        for renderer in self._window.GetRenderers():
+            renderer.SetDraw(renderer is self.renderer)
         self._aim(camera, width, height, shift)
         self._window.Render()
         self._window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, self._bytes)

@@ -56,6 +56,10 @@ class Layer:
         self.shown = shown
         self._settle()
 
+    def clear(self) -> None:
+        """Have nothing in it."""
+        self._fill(False)
+
     @property
     def visible(self) -> bool:
         """Whether there is something in it and it is not hidden."""

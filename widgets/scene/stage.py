@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 import numpy as np
@@ -23,6 +23,9 @@ from widgets.scene.layers import (
 from widgets.theme import Colours
 
 _Kind = TypeVar("_Kind", bound=Layer)
+Finer = Callable[[], tuple[np.ndarray, np.ndarray]]
+"""Makes the vertices (V, 3) m and faces (F, 3) of a finer skin, when there is time to show it."""
+_FINE = " (fine)"
 _COVER_PX = 12.0  # a skin's points, thinned, lie about as far apart
 OVERLAYS = ("labels", "axes", "legend")
 """Layers that are painted over the picture; those of the picture are named by whoever fills them."""
@@ -30,6 +33,11 @@ OVERLAYS = ("labels", "axes", "legend")
 
 class Stage:
     """What is in the scene.
+
+    Parameters
+    ----------
+    look : colours
+    beside : a stage whose canvas this one shares; it ends with that one
 
     Attributes
     ----------
@@ -39,12 +47,16 @@ class Stage:
     floor : None where none is shown
     """
 
-    def __init__(self, look: Colours) -> None:
-        self.problem = gl_problem()
-        self._canvas = None if self.problem else Canvas()
+    def __init__(self, look: Colours, beside: Stage | None = None) -> None:
+        self.problem: str | None = gl_problem() if beside is None else beside.problem
+        self._canvas: Canvas | None = None if self.problem else Canvas(None if beside is None else beside._canvas)
+        self._beside: list[Stage] = []
+        if beside is not None:
+            beside._beside.append(self)
         self.markers, self.colours = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint8)
         self.floor: Floor | None = None
         self._layers: dict[str, Layer] = {}
+        self._finer: dict[str, tuple[Finer | None, np.ndarray, float]] = {}
         self._hidden: set[str] = set()
         self._look = look
         self._order: list[str] = []
@@ -84,10 +96,38 @@ class Stage:
             self._trails.set(*trail_lines(np.asarray(trails, dtype=float), self.colours, self._look.floor))
 
     def set_mesh(
-        self, name: str, vertices: np.ndarray | None, faces: np.ndarray, colour: np.ndarray, opacity: float
+        self,
+        name: str,
+        vertices: np.ndarray | None,
+        faces: np.ndarray,
+        colour: np.ndarray,
+        opacity: float,
+        finer: Finer | None = None,
     ) -> None:
-        """A skin; see :meth:`MeshLayer.set`."""
+        """A skin; see :meth:`MeshLayer.set`. ``finer`` makes the vertices and faces that :meth:`refine` shows."""
         self._layer(name, MeshLayer).set(vertices, faces, colour, opacity)
+        if self._finer.pop(name, None) is not None and _fine(name) in self._layers:
+            self._layers[_fine(name)].clear()  # it is of what was shown before
+        if finer is not None and vertices is not None:
+            self._finer[name] = finer, colour, opacity
+
+    @property
+    def coarse(self) -> bool:
+        """Whether a skin is seen that :meth:`refine` would show finer."""
+        return any(made is not None for made, _, _ in self._finer.values())
+
+    @property
+    def fine(self) -> bool:
+        """Whether a skin is seen finer than it was set."""
+        return any(made is None for made, _, _ in self._finer.values())
+
+    def refine(self) -> None:
+        """Show every skin as fine as there is."""
+        for name, (finer, colour, opacity) in self._finer.items():
+            if finer is not None:
+                self._layer(_fine(name), MeshLayer).set(*finer(), colour, opacity)
+                self._layers[name].clear()
+                self._finer[name] = None, colour, opacity
 
     def set_bones(self, name: str, points: np.ndarray | None, edges: np.ndarray, colour: np.ndarray) -> None:
         """A skeleton; see :meth:`BoneLayer.set`."""
@@ -104,16 +144,19 @@ class Stage:
 
     def remove(self, name: str) -> None:
         """Take a named layer out for good."""
-        layer = self._layers.pop(name, None)
-        if layer is not None and self._canvas is not None:
-            for actor in layer.actors:
-                self._canvas.renderer.RemoveActor(actor)
+        self._finer.pop(name, None)
+        for own in (name, _fine(name)):
+            layer = self._layers.pop(own, None)
+            if layer is not None and self._canvas is not None:
+                for actor in layer.actors:
+                    self._canvas.renderer.RemoveActor(actor)
 
     def show(self, name: str, shown: bool) -> None:
         """Hide a layer, or show it again; also one that comes later."""
         (self._hidden.discard if shown else self._hidden.add)(name)
-        if name in self._layers:
-            self._layers[name].show(shown)
+        for own in (name, _fine(name)):
+            if own in self._layers:
+                self._layers[own].show(shown)
 
     def shows(self, name: str) -> bool:
         """Whether a layer is not hidden."""
@@ -155,6 +198,8 @@ class Stage:
 
     def release(self) -> None:
         """Draw no more."""
+        for stage in self._beside:
+            stage.release()
         if self._canvas is not None:
             self._canvas.retire(self._layers)
             self._canvas, self.problem = None, "The 3D view is closed."
@@ -176,7 +221,11 @@ class Stage:
             layer = self._layers[name]
             if not isinstance(layer, MeshLayer):
                 return False, 0.0, 0.0
-            return True, -round(layer.opacity, 2), -float(np.linalg.norm(layer.middle() - camera.position()))
+            twin = self._layers.get(_fine(name), layer)  # the two are one skin, and take one place
+            if name.endswith(_FINE):
+                twin = self._layers[name.removesuffix(_FINE)]
+            seen = twin if twin.visible and isinstance(twin, MeshLayer) else layer
+            return True, -round(seen.opacity, 2), -float(np.linalg.norm(seen.middle() - camera.position()))
 
         order = sorted(self._layers, key=rank)
         if order != self._order:
@@ -190,7 +239,7 @@ class Stage:
         if name not in self._layers:
             made: Layer = kind()
             self._layers[name] = made
-            made.show(name not in self._hidden)
+            made.show(name.removesuffix(_FINE) not in self._hidden)
         found = self._layers[name]
         if not isinstance(found, kind):
             raise ValueError(f"the layer {name} is a {type(found).__name__} already")
@@ -201,3 +250,8 @@ class Stage:
             self._floor.set(None, None, np.zeros((0, 3)))
         else:
             self._floor.set(*self.floor.lines(self._look.floor, self._look.floor_strong))
+
+
+def _fine(name: str) -> str:
+    """The layer of a skin's finer mesh: its own, so that each keeps what was prepared for its faces."""
+    return name + _FINE

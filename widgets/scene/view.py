@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import time
+from collections import deque
+from collections.abc import Iterator
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, QTimer, Signal
@@ -11,20 +14,21 @@ from PySide6.QtGui import QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent,
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from widgets import theme
+from widgets.guard import PaintGuard
 from widgets.images import draw_focus, of_rgba, save, to_rgb
-from widgets.scene.legend import ColourBar, Legend, Rgb
+from widgets.scene.contents import Contents
 from widgets.scene.navigate import HELP, Navigator
 from widgets.scene.picking import nearest_point, nearest_segment, points_in_box
-from widgets.scene.sheet import Sheet
-from widgets.scene.sight import Sight
-from widgets.scene.stage import Stage
+from widgets.scene.portraits import Portraits
 
 REST_MS = 140
-"""How long nothing must change before edges are smoothed, where that costs time."""
+"""How long nothing must change before skins are shown finer and edges are smoothed, where that costs time."""
+PATIENCE_MS = 22.0
+"""Finer skins are shown while things move if their pictures take no longer than this."""
 _REACH_MARKER, _REACH_BONE = 10.0, 7.0  # px from what a click is meant for
 
 
-class Scene3D(Sight):
+class Scene3D(Contents):
     """Markers, bodies, skeletons and lines over a floor.
 
     Everything is in metres in the lab, z up; colours are 0 to 255. Layers that need no name are "markers", "trails",
@@ -33,7 +37,11 @@ class Scene3D(Sight):
     Signals
     -------
     marker_clicked(int, modifiers), markers_boxed(list of int, modifiers), bone_clicked(layer, int, modifiers),
-    background_clicked(modifiers), hovered(int) -1 for none, camera_changed()
+    background_clicked(modifiers), hovered(int) -1 for none, camera_changed(), trouble(str) why it cannot be drawn
+
+    Attributes
+    ----------
+    patience_ms : see :data:`PATIENCE_MS`
     """
 
     marker_clicked = Signal(int, object)
@@ -41,6 +49,7 @@ class Scene3D(Sight):
     bone_clicked = Signal(str, int, object)
     background_clicked = Signal(object)
     hovered = Signal(int)
+    trouble = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -51,93 +60,17 @@ class Scene3D(Sight):
         self.setAccessibleName("3D scene")
         self.setAccessibleDescription(HELP)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self._stage = stage = Stage(theme.colours())
-        self._sheet = Sheet()
+        stage = self._stage
         self._navigator = Navigator(self)
+        self._guard = PaintGuard(self, "The 3D scene", self.trouble.emit)
         self._picture: QImage | None = None
         self._dirty = True
+        self.patience_ms = PATIENCE_MS
+        self._fine_ms: deque[float] = deque(maxlen=7)
         self._smoothing: Iterator[np.ndarray | None] | None = None
         self._rest = QTimer(self, singleShot=True)
         self._rest.timeout.connect(self._smooth)
         self.destroyed.connect(lambda: stage.release())  # no reference to self, which is half gone by then
-
-    # What is shown
-
-    def set_markers(self, positions: np.ndarray, colours: np.ndarray, sizes: np.ndarray | None = None) -> None:
-        """Markers at (M, 3) m, NaN hidden, in colours (M, 3) uint8 (or one for all), ``sizes`` (M) times the usual."""
-        self._stage.set_markers(positions, colours, sizes)
-        if self._sheet.hovered >= len(self._stage.markers):
-            self._sheet.hovered = -1
-        self._changed()
-
-    def set_marker_labels(self, labels: Sequence[str] | None) -> None:
-        """A name for each marker; None for none."""
-        self._sheet.labels = list(labels or [])
-        self.update()
-
-    def set_selected(self, indices: Iterable[int]) -> None:
-        """The markers with a ring about them."""
-        self._sheet.selected = sorted({int(i) for i in indices})
-        self.update()
-
-    def set_trails(self, points: np.ndarray | None) -> None:
-        """Where the markers were, (k, M, 3) m, oldest first; None for no trails. Set the markers first."""
-        self._stage.set_trails(points)
-        self._changed()
-
-    def set_mesh(
-        self,
-        layer: str,
-        vertices: np.ndarray | None,
-        faces: np.ndarray,
-        colour: np.ndarray | Rgb | None = None,
-        opacity: float = 1.0,
-    ) -> None:
-        """A skin of vertices (V, 3) m, None for none, and faces (F, 3).
-
-        ``colour`` is one (3), one a vertex (V, 3) uint8, or None for the theme's body colour.
-        """
-        wanted = np.asarray(theme.colours().body if colour is None else colour)
-        self._stage.set_mesh(layer, vertices, np.asarray(faces), wanted, opacity)
-        self._changed()
-
-    def set_bones(
-        self, layer: str, points: np.ndarray | None, edges: np.ndarray, colour: np.ndarray | Rgb | None = None
-    ) -> None:
-        """A skeleton of joints (J, 3) m, None for none, and edges (B, 2) from the nearer to the farther joint.
-
-        ``colour`` is one (3), one a bone (B, 3) uint8, or None for the theme's bone colour.
-        """
-        wanted = np.asarray(theme.colours().bone if colour is None else colour)
-        self._stage.set_bones(layer, points, np.asarray(edges), wanted)
-        self._changed()
-
-    def set_lines(
-        self, layer: str, a: np.ndarray | None, b: np.ndarray | None, colours: np.ndarray | Rgb = (128, 128, 128)
-    ) -> None:
-        """Pieces from (N, 3) to (N, 3) m, NaN left out, None for none; one colour (3) or one a piece (N, 3) uint8."""
-        self._stage.set_lines(layer, a, b, np.asarray(colours))
-        self._changed()
-
-    def set_floor(self, z: float | None) -> None:
-        """The floor's height, m, None for no floor. It holds what is shown now, and grows with the markers."""
-        self._stage.set_floor(z)
-        self._changed()
-
-    def show_layer(self, layer: str, shown: bool) -> None:
-        """Hide a layer, or show it again."""
-        self._stage.show(layer, shown)
-        self._changed()
-
-    def remove(self, layer: str) -> None:
-        """Take a mesh, bones or lines out for good."""
-        self._stage.remove(layer)
-        self._changed()
-
-    def set_legend(self, title: str, entries: Sequence[tuple[str, Rgb]] | ColourBar | None) -> None:
-        """What the colours mean: kinds with their colour, or a scale; None for no legend."""
-        self._sheet.legend = None if entries is None else Legend(title, entries)
-        self.update()
 
     # What the mouse does, and what is under the pointer
 
@@ -190,6 +123,11 @@ class Scene3D(Sight):
         return self._stage.problem
 
     @property
+    def fine(self) -> bool:
+        """Whether the skins are seen as fine as there are."""
+        return not self._stage.coarse
+
+    @property
     def settled(self) -> bool:
         """Whether what is on the screen is as good as it gets."""
         return self._stage.problem is not None or not (self._dirty or self._rest.isActive())
@@ -204,6 +142,7 @@ class Scene3D(Sight):
         painter = QPainter(picture)
         painter.setFont(self.font())
         if self._stage.problem is None:
+            self._stage.refine()
             drawn = of_rgba(self._stage.picture(self._camera, (width, height), ratio, smooth=True))
             painter.drawImage(QRectF(0, 0, width, height), drawn)
             self._dirty = True  # the canvas holds another size or shift now
@@ -215,6 +154,10 @@ class Scene3D(Sight):
     def save_png(self, path: str | Path, scale: float = 1.0) -> None:
         """Write :meth:`image` to a file, whole or not at all; OSError where that cannot be done."""
         save(self.image(scale), path)
+
+    def portraits(self) -> Portraits:
+        """What draws small pictures of other bodies, in this scene's canvas."""
+        return Portraits(self._stage)
 
     def turntable(self, count: int, size: tuple[int, int] | None = None) -> Iterator[np.ndarray]:
         """``count`` pictures (H, W, 3) uint8 once about the target; the camera then is where it was."""
@@ -231,7 +174,9 @@ class Scene3D(Sight):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the scene where it changed, and what stands over it."""
-        painter = QPainter(self)
+        self._guard.paint(self._paint)
+
+    def _paint(self, painter: QPainter) -> None:
         if self._stage.problem is None:
             if self._dirty or self._picture is None:
                 self._quick()
@@ -246,7 +191,6 @@ class Scene3D(Sight):
         self._sheet.paint(painter, self._stage, self._camera, (self.width(), self.height()), self._navigator.band)
         if self.hasFocus():
             draw_focus(painter, self.rect())
-        painter.end()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Another size needs another picture."""
@@ -296,22 +240,41 @@ class Scene3D(Sight):
     def _quick(self) -> None:
         """A picture at once; a processor that draws gets the screen's fine pixels only when all is at rest."""
         self._dirty, self._smoothing = False, None
+        began = time.perf_counter()
+        if not self._stage.software or self._is_quick():
+            self._stage.refine()
         ratio = 1.0 if self._stage.software else self.devicePixelRatioF()
         drawn = self._stage.picture(self._camera, (self.width(), self.height()), ratio, smooth=False)
         self._picture = of_rgba(drawn)
+        self._note(began)
         if self._stage.software:
             self._rest.start(REST_MS)
 
     def _smooth(self) -> None:
-        """One step towards a smooth picture; then the next, unless something changed meanwhile."""
+        """One step towards a fine and smooth picture; then the next, unless something changed meanwhile."""
         if self._dirty or self._stage.problem is not None:
+            return
+        if self._stage.coarse:
+            self._stage.refine()
+            self._changed()
             return
         if self._smoothing is None:
             size = (self.width(), self.height())
             self._smoothing = self._stage.smoothing(self._camera, size, self.devicePixelRatioF())
+        began = time.perf_counter()
         drawn = next(self._smoothing, None)
+        self._note(began)
         if drawn is None:
             self._rest.start(0)
             return
         self._smoothing, self._picture = None, of_rgba(drawn)
         self.update()
+
+    def _is_quick(self) -> bool:
+        """Whether the finer skins have been drawn quickly enough of late to be shown while things move."""
+        return len(self._fine_ms) > 3 and median(self._fine_ms) <= self.patience_ms
+
+    def _note(self, began: float) -> None:
+        """Remember how long a picture with finer skins took."""
+        if self._stage.fine:
+            self._fine_ms.append(1000 * (time.perf_counter() - began))

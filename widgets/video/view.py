@@ -20,6 +20,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from widgets import palette, theme
+from widgets.guard import PaintGuard
 from widgets.images import draw_focus, of_rgb, save
 from widgets.video.outline import Outline
 from widgets.video.paint import draw_landmarks, draw_lines, draw_markers, draw_text
@@ -39,12 +40,13 @@ class VideoView(QWidget):
 
     Signals
     -------
-    marker_clicked(int, modifiers), background_clicked(modifiers), zoom_changed()
+    marker_clicked(int, modifiers), background_clicked(modifiers), zoom_changed(), trouble(str) why it cannot be drawn
     """
 
     marker_clicked = Signal(int, object)
     background_clicked = Signal(object)
     zoom_changed = Signal()
+    trouble = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -54,6 +56,7 @@ class VideoView(QWidget):
         self.setAccessibleName("Video")
         self.setAccessibleDescription(HELP)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        self._guard = PaintGuard(self, "The video", self.trouble.emit)
         self._picture: QImage | None = None
         self._text = ""
         self._empty = "No video"
@@ -178,11 +181,12 @@ class VideoView(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw it all."""
-        painter = QPainter(self)
+        self._guard.paint(self._paint_all)
+
+    def _paint_all(self, painter: QPainter) -> None:
         self._paint(painter)
         if self.hasFocus():
             draw_focus(painter, self.rect())
-        painter.end()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Keep the middle of what is seen; a picture that was fitted stays so."""
