@@ -8,6 +8,7 @@ which is cleared away; what it had finished is in the store.
 from __future__ import annotations
 
 import multiprocessing
+import os
 import queue
 import signal
 import threading
@@ -25,6 +26,8 @@ from solver.pipeline.store import Store
 from solver.progress import Found
 
 _REPORT_EVERY_S = 0.05
+_NICE = 5
+"""How far the child steps back, so that a window is drawn first where processors are short."""
 
 
 @dataclass(frozen=True)
@@ -159,6 +162,8 @@ def _child(sender: Connection, function: Callable[..., Any], args: tuple[Any, ..
     """Run the function and send what happens."""
     # Ctrl+C in a terminal reaches the child too; whether to stop is the parent's decision.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with suppress(OSError, AttributeError):  # Windows knows no such thing
+        os.nice(_NICE)
     say = _Sender(sender)
     try:
         say.send(Finished(function(*args, progress=say, on_event=say.send, **kwargs)))
