@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.actions.action import Action, Asks, Reason, first, needs, needs_session
+from app.actions.action import Action, Asks, Reason, first, needs, needs_idle, needs_session
+from app.actions.run_actions import run_until
 from app.models import edits, group_edits
 from app.models.edits import Edit
 from app.models.workbench import Workbench
@@ -104,6 +105,21 @@ def _no_candidate(bench: Workbench) -> str:
     if reason := needs("orient", "there are no ranked candidates")(bench):
         return reason
     return "" if bench.selection.candidate is not None else "no candidate is selected"
+
+
+def _leave_ghosts(bench: Workbench, asks: Asks) -> None:
+    bench.selection.select(iteration=None, candidate=None, hypothesis=None)
+
+
+def _no_ghost(bench: Workbench) -> str:
+    chosen = bench.selection
+    shown = (chosen.iteration, chosen.candidate, chosen.hypothesis) != (None, None, None)
+    return "" if shown else "the fit is shown as it is"
+
+
+def _pin_and_run(bench: Workbench, asks: Asks) -> None:
+    _pin(bench, asks)
+    run_until(bench, None)
 
 
 def _unpin(bench: Workbench, asks: Asks) -> None:
@@ -221,7 +237,25 @@ EDIT_ACTIONS = (
         why_not=_needs_groups,
     ),
     Action("candidate.pin", "Pin candidate", "Edit", "Go on from the selected candidate.", _pin, "P", _no_candidate),
+    Action(
+        "candidate.pin_run",
+        "Pin candidate and run on",
+        "Edit",
+        "Go on from the selected candidate, and compute what follows from it at once.",
+        _pin_and_run,
+        "Shift+P",
+        first(_no_candidate, needs_idle),
+    ),
     Action("candidate.unpin", "Unpin candidate", "Edit", "Go on from the best candidate.", _unpin, "", _not_pinned),
+    Action(
+        "ghosts.leave",
+        "Back to the fit",
+        "View",
+        "Show the fitted body alone again: no candidate, no hypothesis, no iteration on the way to it.",
+        _leave_ghosts,
+        "Shift+Esc",
+        _no_ghost,
+    ),
     Action(
         "offset.found",
         "Use the offset found",

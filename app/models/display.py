@@ -9,6 +9,9 @@ from app.models.signal import Signal
 
 ColourBy = Literal["cluster", "bone", "residual", "gaps", "selection"]
 COLOURS: tuple[ColourBy, ...] = get_args(ColourBy)
+Statistic = Literal["mean", "median", "p95", "worst"]
+STATISTICS: dict[Statistic, str] = {"mean": "Mean", "median": "Median", "p95": "95th percentile", "worst": "Worst"}
+"""What the residual over time is of the markers in each frame."""
 LAYERS = {
     "markers": ("Markers", True),
     "labels": ("Marker names", False),
@@ -35,6 +38,9 @@ class Display:
     trail_s : s, how far back the trails reach
     follow : whether the camera goes with the person
     boxing : whether a plain drag in the scene draws a box about markers
+    residual : which value over the markers the timelines show of every fit
+    residual_selected : whether only the selected markers count there
+    hidden_fits : keys of the fits that are not shown there
     changed : emitted with the names of what changed; a layer is "layer.NAME"
     """
 
@@ -46,6 +52,9 @@ class Display:
         self.trail_s = 0.5
         self.follow = False
         self.boxing = False
+        self.residual: Statistic = "mean"
+        self.residual_selected = False
+        self.hidden_fits: tuple[str, ...] = ()
 
     def set(self, **values: Any) -> None:
         """Change any of the values; what cannot be is left as it is."""
@@ -73,7 +82,10 @@ class Display:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Show what ``state`` gave; what cannot be understood is left out."""
-        self.set(**{name: value for name, value in state.items() if name in _SOUND})
+        values = {name: value for name, value in state.items() if name in _SOUND}
+        if isinstance(values.get("hidden_fits"), list):
+            values["hidden_fits"] = tuple(values["hidden_fits"])
+        self.set(**values)
         layers = state.get("layers")
         for name, shown in layers.items() if isinstance(layers, Mapping) else ():
             if name in self.layers and isinstance(shown, bool):
@@ -90,5 +102,8 @@ _SOUND = {
     "trail_s": _number(0, 60),
     "follow": lambda v: isinstance(v, bool),
     "boxing": lambda v: isinstance(v, bool),
+    "residual": lambda v: v in STATISTICS,
+    "residual_selected": lambda v: isinstance(v, bool),
+    "hidden_fits": lambda v: isinstance(v, tuple) and all(isinstance(key, str) for key in v),
 }
 """What each value must be."""

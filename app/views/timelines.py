@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 
+from app.models.display import Statistic
+from app.views.bodies import BodyTrack
 from app.views.clocks import on_clock, over_markers
 from app.views.tracks import FILLED, MEASURED, OUTLIER, MarkerTracks, pooled
 from solver.markers import Markers
 from solver.prior import PosePrior
-from solver.solve.results import FittedMotion
 from solver.sync import Sync
 from solver.video.landmarks import Landmarks
 from widgets import palette
 from widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
 
-Statistic = Literal["mean", "median", "p95", "worst"]
+CLEANING = "Cleaning"
+"""Name of the row of what was cut and filled."""
 TRACKED, UNSEEN = 0, 1
 """States of a video frame; where both fall on one pixel, the loss shows."""
 _SAID = {"mean": "mean", "median": "median", "p95": "95th percentile", "worst": "worst"}
@@ -75,11 +77,25 @@ def video_row(watched: Landmarks | PosePrior, sync: Sync) -> StateRow:
     )
 
 
+class Residuals(Protocol):
+    """How far something is from the markers: ``time`` (T,) s, ``residual`` (T, M) m."""
+
+    @property
+    def time(self) -> np.ndarray:
+        """(T,) s."""
+
+    @property
+    def residual(self) -> np.ndarray:
+        """(T, M) m, NaN where there is none."""
+
+
 def residual_row(
-    fits: Mapping[str, FittedMotion],
+    fits: Mapping[str, Residuals],
     time: np.ndarray,
     statistic: Statistic = "mean",
     markers: np.ndarray | None = None,
+    ranks: Mapping[str, int] | None = None,
+    also: Sequence[Curve] = (),
 ) -> CurveRow:
     """Distance of the markers from their places over time, a curve for each fit, mm.
 
@@ -89,13 +105,17 @@ def residual_row(
     time : (T,) s, the clock to lay them on; frames that a fit does not have are NaN
     statistic : over the markers of each frame
     markers : those that count; all where not given
+    ranks : number of each fit's colour, so that it keeps it while others come and go
+    also : further curves, mm
     """
     curves = []
     for i, (label, motion) in enumerate(fits.items()):
         residual = motion.residual if markers is None else motion.residual[:, markers]
         values = 1000 * on_clock(time, motion.time, over_markers(residual, statistic))
-        curves.append(Curve(label, values, palette.categorical(i + 1)[i], dashed=i > 0))
-    whose = "all markers" if markers is None else f"{len(markers)} selected markers"
+        rank = i if ranks is None else ranks[label]
+        curves.append(Curve(label, values, palette.categorical(rank + 1)[rank], dashed=i > 0))
+    curves += also
+    whose = "all markers" if markers is None else f"{len(markers)} selected marker{'s' if len(markers) != 1 else ''}"
     return CurveRow(
         "Residual",
         time,
@@ -103,6 +123,54 @@ def residual_row(
         "mm",
         help=f"How far the markers are from where the body puts them: {_SAID[statistic]} over {whose}.",
     )
+
+
+def candidate_curve(
+    track: BodyTrack,
+    markers: Markers,
+    label: str,
+    colour: np.ndarray,
+    statistic: Statistic = "mean",
+    chosen: np.ndarray | None = None,
+) -> Curve:
+    """Distance of the markers from their places on a ghost, at its keyframes, mm; the label says the mean.
+
+    Parameters
+    ----------
+    chosen : the markers that count; all where not given
+    """
+    frames = np.round((track.times - markers.first_time) * markers.rate).astype(int)
+    inside = (frames >= 0) & (frames < len(markers.positions))
+    times, frames = track.times[inside], frames[inside]
+    kept = np.ones(len(track.markers), bool) if chosen is None else np.isin(track.markers, chosen)
+    places = track.places_over(times) if len(times) else np.zeros((0, len(track.markers), 3))
+    away = np.linalg.norm(places - markers.positions[frames][:, track.markers], axis=2)[:, kept]
+    values = 1000 * over_markers(away, statistic)
+    if np.isfinite(values).any():
+        label = f"{label}, {np.nanmean(values):.0f} mm"  # it may be far beyond the fits
+    return Curve(label, values, colour, times, dashed=True, framed=False)
+
+
+def cleaning_row(tracks: MarkerTracks) -> StateRow | None:
+    """Where anything was cut or filled, of any marker; None where nothing was."""
+    filled, cut = ((tracks.state == state).any(axis=1) for state in (FILLED, OUTLIER))
+    if not (filled.any() or cut.any()):
+        return None
+    return StateRow(
+        CLEANING,
+        tracks.markers.time,
+        np.where(cut, 2, filled.astype(np.uint8)).astype(np.uint8),
+        np.array([palette.GAP, palette.DOUBTFUL, palette.OUTLIER], dtype=np.uint8),
+        ("as measured", "filled", "outlier cut"),
+        "Frames in which a sample of any marker was taken out, or a gap was filled. A click selects these markers.",
+    )
+
+
+def mended_at(tracks: MarkerTracks, time: float) -> np.ndarray:
+    """The markers that were cut, or else filled, in the frame nearest to a time, s."""
+    state = tracks.state[tracks.nearest(time)]
+    cut = np.flatnonzero(state == OUTLIER)
+    return cut if len(cut) else np.flatnonzero(state == FILLED)
 
 
 def offset_row(sync: Sync, markers: Markers, watched: Landmarks | PosePrior, found: Sync | None = None) -> OffsetRow:

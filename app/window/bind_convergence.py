@@ -17,9 +17,11 @@ class ConvergenceBinder:
     def __init__(self, widget: ConvergenceView, bench: Workbench, shown: Shown, ghosts: Ghosts) -> None:
         self.widget, self.bench, self.shown, self.ghosts = widget, bench, shown, ghosts
         self.curves: tuple[EnergyCurve, ...] = ()
+        self._telling = False
         shown.changed.connect(self._changed)
         bench.runner.found.connect(self._found)
         bench.runner.changed.connect(self.fill)
+        bench.selection.changed.connect(self._select)
         widget.iteration_chosen.connect(self._chosen)
 
     def fill(self) -> None:
@@ -51,5 +53,21 @@ class ConvergenceBinder:
     def _chosen(self, curve: int, iteration: int) -> None:
         if 0 <= curve < len(self.curves):
             own = self.curves[curve]
-            self.bench.selection.select(iteration=iteration)
+            self._telling = True
+            try:
+                self.bench.selection.select(
+                    iteration=iteration, candidate=own.candidate if own.candidate >= 0 else None
+                )
+            finally:
+                self._telling = False
             self.ghosts.show_iteration(own, own.step(iteration))
+
+    def _select(self, what: frozenset[str]) -> None:
+        """Show the descent of the candidate that was chosen elsewhere."""
+        if self._telling or "candidate" not in what:
+            return
+        row = self.bench.selection.candidate
+        place = next((k for k, own in enumerate(self.curves) if row is not None and own.candidate == row), -1)
+        if place >= 0:
+            steps = self.curves[place].iteration
+            self.widget.set_iteration(place, int(steps[-1]) if len(steps) else 0)

@@ -2,26 +2,44 @@
 
 from __future__ import annotations
 
+from typing import cast
+
+import numpy as np
+
 from app.models import edits
+from app.models.fits import CachedFits
 from app.models.workbench import Workbench
 from app.views import timelines as views
 from app.views.colours import by_cluster
+from app.window.ghosts import Ghosts
 from app.window.keys import how
+from app.window.residual_menu import ResidualMenu
 from app.window.shown import Shown
 from solver.sync import Sync
-from widgets.plots.rows import Row
+from widgets import palette
+from widgets.plots.rows import Curve, CurveRow, Row
 from widgets.plots.timelines import Timelines
+
+RESIDUAL = "Residual"
+_LONGEST = 34
 
 
 class TimelinesBinder:
     """Fills the rows, and takes what is dragged."""
 
-    def __init__(self, widget: Timelines, bench: Workbench, shown: Shown) -> None:
-        self.widget, self.bench, self.shown = widget, bench, shown
+    def __init__(self, widget: Timelines, bench: Workbench, shown: Shown, ghosts: Ghosts) -> None:
+        self.widget, self.bench, self.shown, self.ghosts = widget, bench, shown, ghosts
+        self.fits = CachedFits(bench.board)
+        self.menu = ResidualMenu(bench, self.fits)
+        tip = "Which fits are compared, over which markers, and by which value, in mm"
+        widget.set_row_menu(RESIDUAL, "Compare", tip, self.menu.menu)
+        self._asked: dict[str, object] = {}
         self._span: tuple[float, float] | None = None
         bench.clock.moved.connect(widget.set_time)
         bench.clock.changed.connect(self._clock)
-        bench.selection.changed.connect(lambda what: widget.set_selected(bench.selection.markers))
+        bench.selection.changed.connect(self._select)
+        bench.display.changed.connect(self._display)
+        self.fits.changed.connect(self._fill)
         bench.opened.connect(self._opened)
         shown.changed.connect(self._changed)
         widget.seeked.connect(bench.clock.seek)
@@ -50,10 +68,22 @@ class TimelinesBinder:
 
     def _changed(self, stages: frozenset[str]) -> None:
         if stages & {"markers", "clean", "landmarks", "prior", "sync", "segment", "fit", "compared"}:
-            self.widget.set_rows(self.rows())
+            self._fill()
             self._clock()
             self.widget.set_time(self.bench.clock.time)
             self.widget.set_selected(self.bench.selection.markers)
+
+    def _fill(self) -> None:
+        self.widget.set_rows(self.rows())
+
+    def _display(self, names: frozenset[str]) -> None:
+        if names & {"residual", "residual_selected", "hidden_fits"}:
+            self._fill()
+
+    def _select(self, what: frozenset[str]) -> None:
+        self.widget.set_selected(self.bench.selection.markers)
+        if "candidate" in what or ("markers" in what and self.bench.display.residual_selected):
+            self._fill()
 
     def rows(self) -> list[Row]:
         """All that is known along the clock."""
@@ -76,27 +106,78 @@ class TimelinesBinder:
                 ),
             )
         )
-        motion = shown.fit
-        others = shown.compared("fit")
-        if motion is not None:
-            fits = {"fit in force" if not shown.stale("fit") else "fit (stale)": motion}
-            board = self.bench.board
-            for ref, other in others.items():
-                entry = board.results.entry("fit", ref.key)
-                earlier = (
-                    next((row for row in board.card("fit").earlier if row.key == ref.key), None) if entry else None
-                )
-                said = earlier.settings if earlier is not None and earlier.settings else ref.key[:6]
-                fits[f"compared: {said}"] = other
-            found.append(
-                shown.once(
-                    "residual", (motion, *others.values()), lambda: views.residual_row(fits, tracks.markers.time)
-                )
-            )
+        cleaning = shown.once("cleaning", (tracks,), lambda: views.cleaning_row(tracks))
+        if cleaning is not None:
+            found.append(cleaning)
+        residual = self._residual()
+        if residual is not None:
+            found.append(residual)
         if sync is not None and watched is not None:
             own = (sync, tracks.markers, watched)
             found.append(shown.once("offset", own, lambda: views.offset_row(*own, self._found_offset())))
         return found
+
+    def _residual(self) -> CurveRow | None:
+        """Every fit that is in the store and not hidden, the one shown in the scene first, and the chosen candidate."""
+        shown, display, board = self.shown, self.bench.display, self.bench.board
+        tracks, motion = shown.tracks, shown.fit
+        assert tracks is not None
+        latest = board.latest("fit")
+        chosen = self._chosen()
+        fits: dict[str, views.Residuals] = {}
+        ranks: dict[str, int] = {}
+        if motion is not None and (latest is None or latest[0] not in display.hidden_fits):
+            name = "fit (stale)" if shown.stale("fit") else "fit in force"
+            fits[name], ranks[name] = motion, 0
+        others = [key for key in reversed(self.fits.known) if latest is None or key != latest[0]]
+        for rank, key in enumerate(others, start=1):  # the oldest first, so that colours stay as further fits come
+            residual = self.fits.known[key]
+            if key in display.hidden_fits or (
+                chosen is not None and residual.residual.shape[1] <= chosen.max(initial=-1)
+            ):
+                continue
+            said = self.fits.said(key)
+            label = said if len(said) <= _LONGEST else f"{said[:_LONGEST]}…"
+            label = f"{label} ({key[:4]})" if label in fits else label
+            fits[label], ranks[label] = residual, rank
+        also = self._candidate(chosen)
+        if not fits and also is None:
+            return None
+        asked = self._same("row", (display.residual, None if chosen is None else chosen.tolist(), list(fits)))
+        made = shown.once(
+            "residual",
+            (*fits.values(), tracks, also, asked),
+            lambda: views.residual_row(
+                fits, tracks.markers.time, display.residual, chosen, ranks, () if also is None else (also,)
+            ),
+        )
+        return cast(CurveRow, made)
+
+    def _same(self, name: str, asked: object) -> object:
+        """The object that was asked for by before, if it says the same."""
+        if self._asked.get(name) != asked:
+            self._asked[name] = asked
+        return self._asked[name]
+
+    def _chosen(self) -> np.ndarray | None:
+        chosen = sorted(self.bench.selection.markers)
+        return np.array(chosen) if self.bench.display.residual_selected and chosen else None
+
+    def _candidate(self, chosen: np.ndarray | None) -> Curve | None:
+        row, markers = self.bench.selection.candidate, self.shown.markers
+        track = self.ghosts.candidate_track()
+        if row is None or track is None or markers is None:
+            return None
+        statistic = self.bench.display.residual
+        asked = self._same("candidate", (row, statistic, None if chosen is None else chosen.tolist()))
+        made = self.shown.once(
+            "residual of the candidate",
+            (track, markers, asked),
+            lambda: views.candidate_curve(
+                track, markers, f"candidate {row + 1}", palette.categorical(12)[row % 12], statistic, chosen
+            ),
+        )
+        return cast(Curve, made)
 
     def _found_offset(self) -> Sync | None:
         """An earlier result that looked for the offset by itself, None where there is none."""
@@ -110,6 +191,10 @@ class TimelinesBinder:
     def _clicked(self, row: str, time: float, index: int) -> None:
         tracks = self.shown.tracks
         if tracks is None or index < 0:
+            return
+        if row == views.CLEANING:
+            if len(mended := views.mended_at(tracks, time)):
+                self.bench.selection.select_markers(mended)
             return
         presence = self.shown.once("presence", (tracks, self.shown.clusters), lambda: views.presence_row(tracks))
         if row == presence.name:

@@ -26,11 +26,11 @@ class TransportBinder:
     def read(self) -> None:
         """Say where the clock is."""
         clock = self.bench.clock
-        timing = clock.timing
+        timing, shown = clock.timing, clock.video_frame
         self.widget.set_state(clock.playing, clock.speed, clock.loop is not None)
         self.widget.set_readouts(
             Readout(clock.marker_frame, timing.frames, clock.time),
-            Readout(clock.video_frame, len(timing.video), clock.video_time),
+            Readout(shown, len(timing.video), clock.video_time if shown is None else float(timing.video[shown])),
         )
 
     def _loop(self, on: bool) -> None:

@@ -53,7 +53,7 @@ class Ghosts:
 
     def _selected(self, what: object) -> None:
         names = set(what) if isinstance(what, frozenset | set | tuple | list) else set()
-        if names & {"candidate", "hypothesis"}:
+        if names & {"candidate", "hypothesis"} or ("iteration" in names and self.bench.selection.iteration is None):
             self._iteration = None
             self._make()
 

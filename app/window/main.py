@@ -140,7 +140,7 @@ class MainWindow(QMainWindow):
             scene,
             SceneBarBinder(self.scene_bar, self.scene, bench, self.table),
             VideoBinder(self.video, bench, shown),
-            TimelinesBinder(self.timelines, bench, shown),
+            TimelinesBinder(self.timelines, bench, shown, ghosts),
             StagesBinder(self.stages, self.progress, bench),
             TransportBinder(self.transport, bench),
             MessagesBinder(self.messages, bench),

@@ -174,6 +174,7 @@ def test_an_outline_is_the_rim_of_a_convex_thing() -> None:
         assert got == wanted
     pixels[faces[0, 0]] = np.nan
     assert np.isfinite(outline.segments(pixels)).all()
+    assert not len(Outline(np.zeros((0, 3), int)).segments(np.zeros((0, 2)))), "no mesh, no outline"
     sheet = Outline(faces[:2]).segments(camera.project(vertices, 800, 600)[0])
     assert len(sheet) == 4, "the rim of an open sheet is outline, too"
 

@@ -182,7 +182,8 @@ class CurvePainter:
 
     def __init__(self, row: CurveRow) -> None:
         self.row = row
-        self.limits = limits([curve.values for curve in row.curves], row.lowest)
+        framed = [curve for curve in row.curves if curve.framed] or row.curves
+        self.limits = limits([curve.values for curve in framed], row.lowest)
 
     def height(self, em: float) -> float:
         """Four lines of text, so that a legend does not hide the curves."""

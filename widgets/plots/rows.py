@@ -68,6 +68,7 @@ class Curve:
     colour : (3,) uint8
     time : (T,) s if it has a clock of its own, else None
     dashed : True for what is compared with
+    framed : False where it may go beyond the axis, which the others decide then
     """
 
     label: str
@@ -75,6 +76,7 @@ class Curve:
     colour: np.ndarray
     time: np.ndarray | None = None
     dashed: bool = False
+    framed: bool = True
 
 
 @dataclass(frozen=True, eq=False)

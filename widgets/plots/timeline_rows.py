@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, QPointF, QRect, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFontMetricsF, QHelpEvent, QMouseEvent, QPainter, QPaintEvent, QPixmap, QWheelEvent
-from PySide6.QtWidgets import QToolButton, QToolTip, QWidget
+from PySide6.QtWidgets import QMenu, QToolButton, QToolTip, QWidget
 
 from widgets import palette
 from widgets.plots.ink import colour, elided, em, pen
@@ -51,6 +51,7 @@ class TimelineRows(QWidget):
         self._grabbed = ""
         self._from = 0.0
         self._pressed = QPointF()
+        self._menus: dict[str, QToolButton] = {}
         self._accept = QToolButton(self)
         self._accept.setAccessibleName("Take the automatic offset")
         self._accept.clicked.connect(self._take_automatic)
@@ -69,6 +70,18 @@ class TimelineRows(QWidget):
         self._rows = [known.get(id(row)) or painter_of(row) for row in rows]
         self.updateGeometry()
         self._lay_out()
+
+    def set_row_menu(self, name: str, text: str, tip: str, menu: QMenu) -> None:
+        """Offer a menu below the name of a row."""
+        button = self._menus[name] = QToolButton(self)
+        button.setText(text)
+        button.setToolTip(tip)
+        button.setAccessibleName(f"{name}: {text}")
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        button.setMenu(menu)
+        button.hide()
+        self._place_button()
 
     def set_selected(self, markers: frozenset[int]) -> None:
         """Frame their strips."""
@@ -195,6 +208,12 @@ class TimelineRows(QWidget):
             width = min(size.width(), round(self.margin) - 12)
             self._accept.setGeometry(6, round(area.bottom()) - size.height(), width, size.height())
         self._accept.setVisible(apart)
+        for name, button in self._menus.items():
+            place = next((a for p, a in zip(self._rows, self._areas) if p.row.name == name), None)
+            if place is not None:
+                size = button.sizeHint()
+                button.setGeometry(6, round(place.bottom()) - size.height(), size.width(), size.height())
+            button.setVisible(place is not None)
 
     def _repaint(self) -> None:
         self._picture = None

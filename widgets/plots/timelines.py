@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QFrame, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QMenu, QScrollArea, QVBoxLayout, QWidget
 
 from widgets.plots.rows import Row
 from widgets.plots.time_window import TimeWindow
@@ -81,6 +81,10 @@ class Timelines(QWidget):
         names = [old.name for old in self.rows.shown_rows()]
         at = names.index(row.name) if row.name in names else len(kept)
         self.set_rows([*kept[:at], row, *kept[at:]])
+
+    def set_row_menu(self, name: str, text: str, tip: str, menu: QMenu) -> None:
+        """Offer a menu beside the row of that name, whenever it is shown."""
+        self.rows.set_row_menu(name, text, tip, menu)
 
     def set_time(self, time: float) -> None:
         """Move the cursor to a moment, s."""

@@ -22,7 +22,7 @@ class Outline:
         order = np.lexsort((edges[:, 1], edges[:, 0]))
         edges, owner = edges[order], owner[order]
         pair = (edges[1:] == edges[:-1]).all(axis=1)
-        single = ~(np.append(pair, False) | np.insert(pair, 0, False))
+        single = ~(np.append(pair, False) | np.insert(pair, 0, False))[: len(edges)]  # a mesh may have no faces
         self._edges = np.concatenate([edges[:-1][pair], edges[single]])
         self._sides = np.concatenate(
             [np.stack([owner[:-1][pair], owner[1:][pair]], axis=1), np.stack([owner[single], owner[single]], axis=1)]

@@ -16,6 +16,7 @@ from app.models.imports import new_session
 from app.models.workbench import Said, Workbench
 from app.window.main import MainWindow
 from app.window.showing import Showing
+from solver.pipeline.session import Session
 
 SETTINGS: Mapping[str, Mapping[str, Any]] = {
     "landmarks": {"rate": 10.0},
@@ -119,3 +120,24 @@ def open_window(qapp: QApplication, tmp_path: Path) -> Iterator[Callable[[], Mai
         window.leave()
         window.deleteLater()
     qapp.processEvents()
+
+
+@pytest.fixture
+def solved_window(
+    open_window: Callable[[], MainWindow], spin: Callable[..., None], session: Session
+) -> Callable[..., MainWindow]:
+    """Opens the window on a second of the embedded session, with every result in force."""
+
+    def make(folder: Path | None = None) -> MainWindow:
+        window = open_window()
+        window.resize(1280, 800)
+        window.open_path(folder or session.folder)
+        shown, bench = window.shown, window.bench
+        spin(lambda: shown.track is not None and shown.get("angles") is not None, "the results")
+        spin(lambda: shown.get("orient") is not None and shown.clusters is not None, "the results")
+        spin(lambda: bench.frames is not None and bench.frames.done, "the video")
+        bench.clock.seek(2.5)
+        spin()
+        return window
+
+    return make
