@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import cast
 
 import numpy as np
+from PySide6.QtCore import QTimer
 
 from app.models import edits
 from app.models.fits import CachedFits
@@ -35,6 +36,8 @@ class TimelinesBinder:
         widget.set_row_menu(RESIDUAL, "Compare", tip, self.menu.menu)
         self._asked: dict[str, object] = {}
         self._span: tuple[float, float] | None = None
+        self._filling = QTimer(widget, singleShot=True, interval=0)  # after the scene, so that neither waits for both
+        self._filling.timeout.connect(self._follow)
         bench.clock.moved.connect(widget.set_time)
         bench.clock.changed.connect(self._clock)
         bench.selection.changed.connect(self._select)
@@ -64,14 +67,22 @@ class TimelinesBinder:
         self.widget.set_offset(self.bench.clock.timing.offset)
 
     def _offset(self, offset: float) -> None:
-        self.bench.apply(edits.set_offset(self.bench.document.session, offset))
+        session, sync = self.bench.document.session, self.shown.get("sync")
+        found = sync if sync is not None and sync.method != "given" else self._found_offset()
+        if found is not None and found.offset == offset:  # the automatic one is no number that was given
+            self.bench.apply(edits.find_offset(session))
+        else:
+            self.bench.apply(edits.set_offset(session, offset))
 
     def _changed(self, stages: frozenset[str]) -> None:
         if stages & {"markers", "clean", "landmarks", "prior", "sync", "segment", "fit", "compared"}:
-            self._fill()
-            self._clock()
-            self.widget.set_time(self.bench.clock.time)
-            self.widget.set_selected(self.bench.selection.markers)
+            self._filling.start()
+
+    def _follow(self) -> None:
+        self._fill()
+        self._clock()
+        self.widget.set_time(self.bench.clock.time)
+        self.widget.set_selected(self.bench.selection.markers)
 
     def _fill(self) -> None:
         self.widget.set_rows(self.rows())
