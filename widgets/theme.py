@@ -106,6 +106,13 @@ def apply(app: QApplication, name: str = "system", font_scale: float = 1.0) -> C
     return colours()
 
 
+def set_font_scale(app: QApplication, scale: float) -> None:
+    """Make words larger or smaller, in the look there is."""
+    asked = _state["asked"]
+    assert isinstance(asked, str)
+    apply(app, asked, scale)
+
+
 def font_scale(app: QApplication) -> float:
     """How much larger than the desktop's own the font is."""
     first = app.property("markerscope_font_size")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from app.models.signal import Signal
-from app.models.workbench import Workbench
+from app.models.workbench import Said, Workbench
 
 
 class Asks(Protocol):
@@ -127,7 +127,7 @@ class Actions:
         """Do it; where it cannot be done, the user is told why. Returns whether it was done."""
         action = self.table[name]
         if reason := action.why_not(self._bench):
-            self._bench.say_error(_cannot(action, reason))
+            self._bench.say(Said("note", reason, action.title.rstrip(".")))
             return False
         done = self._bench.attempt(lambda: action.run(self._bench, self._asks))
         if done:
@@ -137,12 +137,6 @@ class Actions:
     def menus(self) -> dict[str, list[Action]]:
         """The actions by menu, in the order of ``MENUS`` and of the table."""
         return {menu: [action for action in self.table.values() if action.menu == menu] for menu in MENUS}
-
-
-def _cannot(action: Action, reason: str) -> Exception:
-    from solver.errors import InputError
-
-    return InputError(reason, action.title.rstrip("."))
 
 
 def first(*reasons: Reason) -> Reason:

@@ -88,7 +88,7 @@ def _export(bench: Workbench, asks: Asks) -> None:
     if answer is None:
         return
     folder, chosen = answer
-    pictures = asks.pictures() if "report" in chosen else ()
+    pictures = asks.pictures() if {"report", "pictures"} & set(chosen) else ()
     written = exports.export(bench.board, folder, chosen, pictures)
     bench.say(Said("note", f"{len(written)} files written", str(folder)))
 
@@ -96,9 +96,8 @@ def _export(bench: Workbench, asks: Asks) -> None:
 def _export_angles(bench: Workbench, asks: Asks) -> None:
     path = asks.file_to_save("angles.csv")
     if path is not None:
-        folder = path if path.is_dir() else path.parent
-        written = exports.export(bench.board, folder, ["angles"])
-        bench.say(Said("note", f"{' and '.join(file.name for file in written)} written", str(folder)))
+        written = exports.export_angles(bench.board, path)
+        bench.say(Said("note", f"{' and '.join(file.name for file in written)} written", str(path.parent)))
 
 
 def _exportable(bench: Workbench) -> str:

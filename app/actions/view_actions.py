@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from app.actions.action import Action, Asks, needs_session
 from app.models.display import COLOURS, LAYERS, ColourBy
@@ -19,6 +20,8 @@ _CAMERAS = {
     "front": "From the front", "back": "From the back", "left": "From the left", "right": "From the right",
     "top": "From the top", "isometric": "From a corner",
 }  # fmt: skip
+TEXT_PERCENT = (100, 125, 150)
+"""Sizes of text, of the desktop's own."""
 _LAYER_KEYS = {"labels": "L", "trails": "T", "body": "B", "skeleton": "K", "ghosts": "H"}
 
 
@@ -60,6 +63,14 @@ def _show(what: str, title: str, menu: str, help: str, shortcut: str = "", sessi
 
     action = Action(what, title, menu, help, run, shortcut)
     return Action(what, title, menu, help, run, shortcut, needs_session) if session else action
+
+
+def _look(what: str, title: str, help: str, value: object) -> Action:
+    """A choice that is kept with the user's preferences, under what stands before the dot."""
+    name = what.partition(".")[0]
+    usual = {"theme": "system", "text": 100}[name]
+    chosen = _show(what, title, "View", help)
+    return replace(chosen, checked=lambda bench: bench.document.home.preferences().get(name, usual) == value)
 
 
 def _follow(bench: Workbench, asks: Asks) -> None:
@@ -130,9 +141,13 @@ VIEW_ACTIONS = (
     _show("export.picture", "Picture of the scene...", "Export", "Write the scene as PNG.", "Ctrl+Shift+P", True),
     _show("export.turntable", "Turntable...", "Export", "Write the scene, turned once round, as MP4.", "", True),
     _show("export.playback", "Playback...", "Export", "Write the scene as it plays as MP4.", "", True),
-    _show("theme.light", "Light", "View", "Dark on light."),
-    _show("theme.dark", "Dark", "View", "Light on dark."),
-    _show("theme.system", "As the system", "View", "Light or dark as the system is."),
+    _look("theme.light", "Light", "Dark on light.", "light"),
+    _look("theme.dark", "Dark", "Light on dark.", "dark"),
+    _look("theme.system", "As the system", "Light or dark as the system is.", "system"),
+    *(
+        _look(f"text.{percent}", f"Text {percent} %", "How large words and figures are.", percent)
+        for percent in TEXT_PERCENT
+    ),
     _show("window.layout", "Arrange panels anew", "View", "Put every panel back in its first place."),
     _show("window.history", "History", "Edit", "Every decision since the session was opened.", "Ctrl+H", True),
     _show("help.search", "Search actions...", "Help", "Find and do anything by its name.", "Ctrl+K"),

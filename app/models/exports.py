@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +14,7 @@ import numpy as np
 from app.models.fields import title
 from app.models.stages import StageBoard
 from solver.errors import InputError
-from solver.io.atomic import make_folder, write_bytes_atomic
+from solver.io.atomic import cannot_write, make_folder, write_bytes_atomic
 from solver.pipeline.methods import spelt_out
 from solver.pipeline.stage import Event, GraphRun
 
@@ -49,13 +51,16 @@ _WORDS = {
     "camera": ("Camera, for other trials (JSON)", "Place, direction and focal length as fitted"),
     "report": ("Report (HTML)", "Pictures, figures and settings for a methods section, in one file"),
 }
+PICTURES = Format(
+    "pictures", "Pictures of the views (PNG)", ("views",), "As they are shown now, in a folder of their own"
+)
 
 
 def formats() -> tuple[Format, ...]:
-    """All that can be written from results alone."""
+    """All that can be written into a folder."""
     from solver.outputs import FORMATS
 
-    return tuple(Format(name, *_WORDS[name][:1], files, _WORDS[name][1]) for name, files in FORMATS.items())
+    return (*(Format(name, *_WORDS[name][:1], files, _WORDS[name][1]) for name, files in FORMATS.items()), PICTURES)
 
 
 def why_not(board: StageBoard) -> str:
@@ -71,7 +76,7 @@ def export(
 
     Parameters
     ----------
-    pictures : views of the session, for the report
+    pictures : views of the session, for the report and the format "pictures"
 
     Raises
     ------
@@ -79,13 +84,39 @@ def export(
     """
     from solver.outputs import FORMATS, write_formats
 
-    if unknown := set(chosen) - set(FORMATS):
-        raise InputError(f"there is no format {sorted(unknown)[0]}", "export", f"use {', '.join(FORMATS)}")
+    known = [*FORMATS, PICTURES.name]
+    if unknown := set(chosen) - set(known):
+        raise InputError(f"there is no format {sorted(unknown)[0]}", "export", f"use {', '.join(known)}")
     if not chosen:
         raise InputError("nothing was chosen", "export", "choose at least one format")
     graph = graph_run(board)
     session = spelt_out(board.document.session, {name: source.digest for name, source in board.sources.items()})
-    return write_formats(folder, session, graph, chosen, pictures)
+    files = [name for name in chosen if name != PICTURES.name]
+    written = write_formats(folder, session, graph, files, pictures) if files else ()
+    if PICTURES.name in chosen:
+        written = (*written, *write_pictures(folder / PICTURES.files[0], pictures))
+    return written
+
+
+def export_angles(board: StageBoard, path: Path) -> tuple[Path, ...]:
+    """Write the joint angles under a name of the user's, and beside them, under the same name, what they mean.
+
+    Raises
+    ------
+    InputError : as in ``export``; nothing is written
+    """
+    path = path if path.suffix else path.with_suffix(".csv")
+    if path.suffix.lower() != ".csv":
+        raise InputError("is no name for a table", path, "choose one that ends in .csv")
+    folder = make_folder(path.parent)
+    try:
+        with tempfile.TemporaryDirectory(prefix=".tmp-", dir=folder) as staging:
+            table, about = export(board, Path(staging), ["angles"])
+            os.replace(about, path.with_suffix(".json"))
+            os.replace(table, path)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    return path, path.with_suffix(".json")
 
 
 def graph_run(board: StageBoard) -> GraphRun:

@@ -10,14 +10,12 @@ from widgets.dialogs.command_palette import PaletteEntry
 
 _SEPARATED = {
     "session.example", "input.video", "session.save", "session.close", "select.all", "select.groups", "candidate.pin",
-    "offset.found",
-    "range.selected", "colour.cluster", "layer.markers", "body.less", "camera.follow", "camera.front",
-    "theme.light", "window.layout",
-    "play.forward", "range.from", "go.worst", "run.stop", "method.bundle", "export.picture", "help.about",
-    "window.history",
+    "offset.found", "range.selected", "body.less", "text.100", "window.layout", "play.forward", "range.from",
+    "go.worst", "run.stop", "method.bundle", "export.picture", "help.about", "window.history",
 }  # fmt: skip
 """Actions that begin another part of their menu."""
-_RADIO = ("colour.", "method.")
+_WITHIN = {"colour": "Colours", "layer": "Layers", "camera": "Camera", "theme": "Look", "text": "Look"}
+"""Actions of one group that share a menu within their menu, by what stands before the dot."""
 
 
 def keys_of(action: Action) -> list[QKeySequence]:
@@ -47,10 +45,18 @@ class Menus:
             made = self.menus[menu] = window.menuBar().addMenu(f"&{menu}")
             made.setToolTipsVisible(True)
             made.aboutToShow.connect(lambda members=members: self.refresh([action.id for action in members]))
+            within: dict[str, QMenu] = {}
             for action in members:
+                title = _WITHIN.get(action.id.partition(".")[0])
+                place = made
+                if title is not None and title not in within:
+                    within[title] = made.addMenu(title)
+                    within[title].setToolTipsVisible(True)
+                if title is not None:
+                    place = within[title]
                 if action.id in _SEPARATED:
-                    made.addSeparator()
-                made.addAction(self._action(window, action))
+                    place.addSeparator()
+                place.addAction(self._action(window, action))
         window.addActions(list(self.qt.values()))
 
     def _action(self, window: QMainWindow, action: Action) -> QAction:

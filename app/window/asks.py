@@ -52,9 +52,13 @@ class WindowAsks:
 
     def file_to_save(self, name: str) -> Path | None:
         """Which file to write."""
-        proposed = str(Path(self._folder("export")) / name)
-        chosen, _ = QFileDialog.getSaveFileName(self.window, f"Write {name}", proposed)
-        return self._remembered("export", chosen)
+        dialog = QFileDialog(self.window, f"Write {name}", self._folder("export"))
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setDefaultSuffix(Path(name).suffix[1:])  # before it asks whether a file may be replaced
+        dialog.selectFile(name)
+        chosen = dialog.selectedFiles() if dialog.exec() == QFileDialog.DialogCode.Accepted else []
+        dialog.deleteLater()
+        return self._remembered("export", chosen[0] if chosen else "")
 
     def how_to_import(self, path: Path) -> Mapping[str, Any] | None:
         """How to read a marker file."""

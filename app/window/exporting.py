@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from PySide6.QtCore import QBuffer, QIODevice
+from PySide6.QtCore import QBuffer, QIODevice, Qt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QProgressDialog, QWidget
 
@@ -82,9 +82,8 @@ def report_pictures(window: MainWindow) -> list[Any]:
 
 def write_turntable(window: MainWindow, path: Path) -> None:
     """The scene turned once round, as MP4."""
-    count, size = int(_TURN_S * _RATE), _even(window.scene)
-    frames = window.scene.turntable(count, size)
-    exports.write_video(path, _watched(window, "Turntable", frames, count), _RATE)
+    count = round(_TURN_S * _RATE)
+    _write_film(window, path, "Turntable", window.scene.turntable(count, _even(window.scene)), count)
 
 
 def write_playback(window: MainWindow, path: Path) -> None:
@@ -92,18 +91,23 @@ def write_playback(window: MainWindow, path: Path) -> None:
     clock = window.bench.clock
     clock.stop()
     start, stop = clock.loop or clock.span
-    count = max(1, int((stop - start) / clock.speed * _RATE))
+    count = max(1, round((stop - start) / clock.speed * _RATE))
     before = clock.time
+    size = _even(window.scene)  # asked once: a message that comes or goes changes the height of the scene
 
     def pictures() -> Iterator[np.ndarray]:
         for k in range(count):
-            clock.seek(start + k * clock.speed / _RATE)
-            yield to_rgb(window.scene.image(1.0, _even(window.scene)))
+            with clock.moved.block():  # the scene alone, not every curve and table
+                clock.seek(start + k * clock.speed / _RATE)
+            window.scene_binder.draw()
+            yield to_rgb(window.scene.image(1.0, size))
 
     try:
-        exports.write_video(path, _watched(window, "Playback", pictures(), count), _RATE)
+        _write_film(window, path, "Playback", pictures(), count)
     finally:
-        clock.seek(before)
+        with clock.moved.block():
+            clock.seek(before)
+        clock.moved.emit(clock.time)
 
 
 def _even(widget: QWidget) -> tuple[int, int]:
@@ -111,17 +115,27 @@ def _even(widget: QWidget) -> tuple[int, int]:
     return max(320, widget.width() // 2 * 2), max(240, widget.height() // 2 * 2)
 
 
-def _watched(window: MainWindow, what: str, frames: Iterator[np.ndarray], count: int) -> Iterator[np.ndarray]:
-    """The frames, with progress and a way to stop."""
-    progress = QProgressDialog(f"{what}: writing {count} frames", "Stop", 0, count, window)
+def _write_film(window: MainWindow, path: Path, what: str, frames: Iterator[np.ndarray], count: int) -> None:
+    """Write the frames, with progress and a way to stop; nothing is left of a film that was stopped."""
+    progress = QProgressDialog(f"{what}: {count} frames into {path.name}", "Stop", 0, count, window)
+    progress.setWindowTitle(what)
+    progress.setWindowModality(Qt.WindowModality.WindowModal)
     progress.setMinimumDuration(300)
-    try:
+    progress.setAutoReset(False)
+
+    def watched() -> Iterator[np.ndarray]:
         for k, frame in enumerate(frames):
             progress.setValue(k)
             QApplication.processEvents()
             if progress.wasCanceled():
                 raise Cancelled
             yield frame
+
+    try:
+        exports.write_video(path, watched(), _RATE)
     finally:
+        close = getattr(frames, "close", None)
+        if close is not None:
+            close()  # at once: what turned the camera puts it back
         progress.close()
         progress.deleteLater()

@@ -24,9 +24,7 @@ def parts_of(window: MainWindow) -> dict[str, Any]:
         "video": window.video.state(),
         "timelines": list(window.timelines.view()),
         "angles": window.angles.shown(),
-        "open_stages": [
-            name for name in window.bench.board.names if window.stages.card(name).is_open()
-        ],
+        "open_stages": window.stages.open_cards(),
     }  # fmt: skip
 
 
@@ -39,6 +37,5 @@ def restore(window: MainWindow, view: dict[str, Any]) -> None:
     if isinstance(layout, str):
         with suppress(binascii.Error, ValueError):
             window.restoreState(QByteArray(base64.b64decode(layout, validate=True)), LAYOUT_VERSION)
-    for name in opened if isinstance(opened, list) else ():
-        if name in window.bench.board.names:
-            window.stages.card(name).set_open(True)
+    if isinstance(opened, list):
+        window.stages.set_open_cards(name for name in opened if isinstance(name, str))

@@ -11,7 +11,7 @@ from app.models.workbench import Said
 from app.window.exporting import write_playback, write_turntable
 from solver import __version__
 from widgets import theme
-from widgets.dialogs.command_palette import CommandPalette
+from widgets.dialogs.command_palette import CommandPalette, PaletteEntry
 from widgets.dialogs.shortcut_sheet import ShortcutSheet
 
 if TYPE_CHECKING:
@@ -35,6 +35,10 @@ class Showing:
             self.window.scene.view_from(name)
         elif kind == "theme":
             self._theme(name)
+        elif kind == "text":
+            self._text(int(name))
+        elif kind == "panel":
+            self.window.raise_dock(name)
         elif kind == "export":
             self._export(name)
         elif what == "window.layout":
@@ -53,6 +57,13 @@ class Showing:
         assert isinstance(app, QApplication)
         theme.apply(app, name, theme.font_scale(app))
         self.window.bench.document.home.prefer(theme=name)
+        self.window.redraw()
+
+    def _text(self, percent: int) -> None:
+        app = QApplication.instance()
+        assert isinstance(app, QApplication)
+        theme.set_font_scale(app, percent / 100)
+        self.window.bench.document.home.prefer(text=percent)
         self.window.redraw()
 
     def _export(self, name: str) -> None:
@@ -79,8 +90,19 @@ class Showing:
     def _search(self) -> None:
         if self.palette is None:
             self.palette = CommandPalette(self.window)
-            self.palette.chosen.connect(lambda name: self.window.table.trigger(name))
-        self.palette.open_with(self.window.menus.entries())
+            self.palette.chosen.connect(self._chosen)
+        panels = [
+            PaletteEntry(f"panel.{name}", f"Panel: {dock.windowTitle()}", help=f"{dock.toolTip()}.")
+            for name, dock in self.window.docks.docks.items()
+            if self.window.bench.document.is_open
+        ]
+        self.palette.open_with([*self.window.menus.entries(), *panels])
+
+    def _chosen(self, name: str) -> None:
+        if name.startswith("panel."):
+            self.show(name)
+        else:
+            self.window.table.trigger(name)
 
     def _shortcuts(self) -> None:
         if self.sheet is not None:

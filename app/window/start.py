@@ -78,6 +78,7 @@ def open_window(path: Path | None = None, example: bool = False) -> int:
     from PySide6.QtCore import QTimer
     from PySide6.QtWidgets import QApplication
 
+    from app.actions.view_actions import TEXT_PERCENT
     from app.models.home import Home
     from app.models.workbench import Workbench
     from app.window.main import MainWindow
@@ -87,8 +88,10 @@ def open_window(path: Path | None = None, example: bool = False) -> int:
     assert isinstance(app, QApplication)
     app.setApplicationName("Markerscope")
     home = Home.of_user()
-    wanted = home.preferences().get("theme")
-    theme.apply(app, wanted if wanted in theme.NAMES else "system")
+    prefers = home.preferences()
+    wanted, percent = prefers.get("theme"), prefers.get("text")
+    scale = percent / 100 if percent in TEXT_PERCENT else 1.0
+    theme.apply(app, wanted if wanted in theme.NAMES else "system", scale)
     bench = Workbench(home)
     window = MainWindow(bench)
     window.show()

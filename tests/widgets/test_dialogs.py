@@ -195,7 +195,7 @@ def test_messages_say_what_where_and_what_to_do(qapp: QApplication) -> None:
     made = MessageBar()
     assert not made.isVisibleTo(None)
     made.show_message(Message("error", "The file ends early.", "walk.c3d, frame 12", "export it again", "Retry"))
-    assert made.rows()[0].sentence() == "The file ends early (walk.c3d, frame 12). Export it again."
+    assert made.rows()[0].sentence() == "walk.c3d, frame 12: The file ends early. Export it again."
     acted: list[Message] = []
     closed: list[Message] = []
     made.action_wanted.connect(acted.append)

@@ -111,7 +111,7 @@ class ExportDialog(QDialog):
         layout.addLayout(where)
         layout.addWidget(self._files)
         layout.addWidget(self.buttons)
-        self._inner = inner
+        self._inner, self._column = inner, column
         self._say()
 
     def chosen(self) -> list[str]:
@@ -130,10 +130,11 @@ class ExportDialog(QDialog):
     def sizeHint(self) -> QSize:
         """All formats where the screen allows."""
         line = self.fontMetrics().height()
-        return QSize(36 * line, min(self._inner.sizeHint().height() + 12 * line, 48 * line))
+        tall = self._column.totalHeightForWidth(36 * line)
+        return QSize(40 * line, min(max(tall, self._inner.sizeHint().height()) + 12 * line, 56 * line))
 
     def _say(self) -> None:
-        files = [name for entry in self.chosen() for name in self._formats[entry].files]
+        files = list(dict.fromkeys(name for entry in self.chosen() for name in self._formats[entry].files))
         replaced = [name for name in files if name in self._existing]
         text = f"Will write {', '.join(files)}." if files else "Choose what to write."
         if replaced:

@@ -45,6 +45,7 @@ class ShortcutSheet(QDialog):
         sheet.setSpacing(28)
         for column in columns:
             part = QVBoxLayout()
+            part.setSpacing(4)
             for title, rows in column:
                 part.addWidget(_heading(title))
                 part.addLayout(_rows(rows))
@@ -80,6 +81,7 @@ def _rows(rows: Sequence[tuple[str, str]]) -> QGridLayout:
     grid, look = QGridLayout(), colours()
     grid.setColumnStretch(1, 1)
     grid.setHorizontalSpacing(12)
+    grid.setVerticalSpacing(4)
     for row, (keys, what) in enumerate(rows):
         key, text = QLabel(keys), QLabel(what)
         key.setStyleSheet(

@@ -84,11 +84,11 @@ class MessageRow(QFrame):
     def sentence(self) -> str:
         """All of it."""
         message = self.message
-        where = f" ({message.where})" if message.where else ""
-        what = message.what.rstrip(".")
+        where = f"{message.where}: " if message.where else ""
+        what = message.what.rstrip(".") if where else (message.what[:1].upper() + message.what[1:]).rstrip(".")
         remedy = message.remedy[:1].upper() + message.remedy[1:]
         remedy = remedy if not remedy or remedy.endswith(".") else f"{remedy}."
-        return f"{what}{where}. {remedy}".strip()
+        return f"{where}{what}. {remedy}".strip()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw a ground with an edge in the colour of the level."""

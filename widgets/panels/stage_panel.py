@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from PySide6.QtCore import QEvent, QObject, QSize, Qt, Signal
 from PySide6.QtWidgets import QFrame, QScrollArea, QVBoxLayout, QWidget
@@ -35,6 +35,7 @@ class StagePanel(QScrollArea):
         self._layout.addStretch(1)
         self.setWidget(self._inner)
         self._cards: dict[str, StageCard] = {}
+        self._to_open: frozenset[str] | None = None
 
     def set_stages(self, stages: Sequence[StageData]) -> None:
         """Show these, in order; cards of stages that stay are kept, with what is open in them."""
@@ -48,6 +49,9 @@ class StagePanel(QScrollArea):
             self._cards = cards
         for stage in stages:
             self._cards[stage.name].set_data(stage)
+        if self._to_open is not None and self._cards:
+            wanted, self._to_open = self._to_open, None
+            self.set_open_cards(wanted)
 
     def set_progress(self, name: str, progress: StageProgress) -> None:
         """Show how far a running stage is."""
@@ -57,6 +61,18 @@ class StagePanel(QScrollArea):
     def card(self, name: str) -> StageCard:
         """The card of a stage."""
         return self._cards[name]
+
+    def open_cards(self) -> list[str]:
+        """Stages whose cards are open, in order."""
+        return [name for name, card in self._cards.items() if card.is_open()]
+
+    def set_open_cards(self, names: Iterable[str]) -> None:
+        """Have these open and no others; of stages that are not shown yet, once they are."""
+        wanted = frozenset(names)
+        if not self._cards:
+            self._to_open = wanted
+        for name, card in self._cards.items():
+            card.set_open(name in wanted)
 
     def show_stage(self, name: str) -> None:
         """Open a stage's card and bring it into sight."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QDragEnterEvent, QDropEvent, QFont, QPalette
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QPalette
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from widgets.icons import icon
@@ -69,10 +69,12 @@ class WelcomePage(QWidget):
         column.addWidget(self._heading)
         column.addLayout(self._recent)
         column.addStretch(2)
-        inner = QWidget()
+        inner, page = QWidget(), QWidget()
+        page.setLayout(column)
+        page.setMaximumWidth(48 * self.fontMetrics().height())
         middle = QHBoxLayout(inner)
         middle.addStretch(1)
-        middle.addLayout(column, 4)
+        middle.addWidget(page, 100)
         middle.addStretch(1)
         scroll = QScrollArea()
         scroll.setWidgetResizable(True)
@@ -122,6 +124,12 @@ class WelcomePage(QWidget):
             event.acceptProposedAction()
             self.files_dropped.emit(paths)
 
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow another size of text."""
+        if event.type() == QEvent.Type.FontChange and hasattr(self, "_drop"):
+            self._paint()
+        super().changeEvent(event)
+
     def _button(self, glyph: str, text: str, tip: str) -> QPushButton:
         button = QPushButton(icon(glyph, "accent"), f"  {text}")
         side = round(1.6 * self.fontMetrics().height())
@@ -134,11 +142,7 @@ class WelcomePage(QWidget):
         return button
 
     def _paint(self) -> None:
-        font = QFont(self.font())
-        font.setPointSizeF(1.9 * font.pointSizeF())
-        font.setBold(True)
-        self._title.setFont(font)
-        bold = QFont(self.font())
-        bold.setBold(True)
-        self._heading.setFont(bold)
+        # As style sheets: fonts that are set are lost when the page is given to a window.
+        self._title.setStyleSheet(f"font-size: {1.9 * self.font().pointSizeF():.1f}pt; font-weight: bold")
+        self._heading.setStyleSheet("font-weight: bold")
         self._drop.setForegroundRole(QPalette.ColorRole.PlaceholderText)

@@ -127,7 +127,7 @@ def test_what_cannot_be_done_is_said_and_not_done(actions: Actions, said: list[S
     done: list[str] = []
     actions.done.connect(done.append)
     assert not actions.trigger("run.all")
-    assert said == [Said("error", "no session is open", "Run all")]
+    assert said == [Said("note", "no session is open", "Run all")]
     assert done == []
 
 

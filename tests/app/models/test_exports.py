@@ -11,7 +11,7 @@ import pytest
 
 from app.models import edits
 from app.models.document import Document
-from app.models.exports import export, formats, why_not, write_pictures, write_video
+from app.models.exports import export, export_angles, formats, why_not, write_pictures, write_video
 from app.models.home import Home
 from app.models.stages import StageBoard
 from solver.errors import InputError
@@ -32,8 +32,9 @@ def board(session: Session, tmp_path: Path) -> StageBoard:
 
 def test_every_format_leaves_its_files(board: StageBoard, tmp_path: Path) -> None:
     picture = Picture("From the front", b"\x89PNG")
-    written = export(board, tmp_path / "out", list(FORMATS), [picture])
-    names = {path.name for path in written}
+    written = export(board, tmp_path / "out", [*FORMATS, "pictures"], [picture])
+    assert written[-1] == tmp_path / "out" / "views" / "01_from_the_front.png"
+    names = {path.name for path in written[:-1]} | {"views"}
     assert names == {path.name for path in (tmp_path / "out").iterdir()}
     assert names | set(SOMETIMES) == {name for format in formats() for name in format.files}
     assert "From the front</figcaption>" in (tmp_path / "out" / "report.html").read_text()
@@ -61,6 +62,16 @@ def test_settings_and_digests_are_written_beside_the_angles(board: StageBoard, t
     assert len(rows) == angles.degrees.size
     knee = [float(row["degrees"]) for row in rows if row["angle"] == "knee_angle_r"]
     assert knee == pytest.approx(angles.degrees[:, angles.names.index("knee_angle_r")], abs=1e-4)
+
+
+def test_angles_are_written_under_a_name_of_the_users(board: StageBoard, tmp_path: Path) -> None:
+    table, about = export_angles(board, tmp_path / "squat 3")
+    assert (table.name, about.name) == ("squat 3.csv", "squat 3.json")
+    assert {path.name for path in tmp_path.iterdir()} >= {table.name, about.name}
+    assert not list(tmp_path.glob(".tmp-*")) and not (tmp_path / "angles.csv").exists()
+    assert len(list(csv.reader(table.open()))) == 1 + len(board.current["angles"].degrees)
+    with pytest.raises(InputError, match="choose one that ends in .csv"):
+        export_angles(board, tmp_path / "angles.xlsx")
 
 
 def test_stale_results_are_not_exported(board: StageBoard, tmp_path: Path) -> None:
