@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -92,6 +92,19 @@ class Layout:
         arrays = (self.vertex, self.joint, self.offset, self.normal, self.columns)
         vertex, joint, offset, normal, columns = (array[index] for array in arrays)
         return Layout(tuple(self.labels[i] for i in index), vertex, joint, offset, normal, columns, self.body)
+
+    def plain(self) -> dict[str, Any]:
+        """As JSON has it, to the hundredth of a millimetre."""
+        whole = {name: getattr(self, name).tolist() for name in ("vertex", "joint", "columns")}
+        broken = {name: np.round(getattr(self, name), 5).tolist() for name in ("offset", "normal")}
+        return {"labels": list(self.labels), **whole, **broken, "body": self.body}
+
+    @classmethod
+    def from_plain(cls, said: Mapping[str, Any]) -> Layout:
+        """Back from JSON."""
+        vertex, joint, columns = (np.array(said[name], dtype=np.intp) for name in ("vertex", "joint", "columns"))
+        offset, normal = (np.array(said[name], dtype=float).reshape(-1, 3) for name in ("offset", "normal"))
+        return cls(tuple(map(str, said["labels"])), vertex, joint, offset, normal, columns, str(said["body"]))
 
     def rest(self, body: Body, betas: np.ndarray | None = None) -> np.ndarray:
         """(M, 3) m, the markers on the body at rest; on its mean shape where ``betas`` is None."""
