@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.clean.beside import beside_neighbours
 from solver.clean.request import OutlierMethod
 
 _FLOOR_M = 0.0003
@@ -16,6 +17,8 @@ _SMOOTH = 7
 """Frames about one from which its usual velocity is taken."""
 _LEAST_BESIDE, _MOST_BESIDE = 0.2, 0.85
 _ROUNDS = 6
+_JUMP_SHARE = 2 / 3
+"""Of ``ratio``: there and back again by the same way is sign enough for less."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +29,8 @@ class OutlierSettings:
     ----------
     method : ``local``: acceleration over its own local median; ``prominence``: peaks of acceleration, as published;
         ``none``
-    ratio : local: how many times the usual acceleration there is too much
-    least : m, local: a sample this near to where its neighbours in time have it is never an outlier
+    ratio : local: how many times what is usual there is too much
+    least : m, local: a sample this near to where the samples before and after have it is never an outlier
     window : s, local: over which the usual acceleration is taken
     longest : frames, local: an excursion that comes back within so many is an outlier as a whole
     prominence : m/s^2, of a published peak
@@ -36,7 +39,7 @@ class OutlierSettings:
     """
 
     method: OutlierMethod = "local"
-    ratio: float = 6.0
+    ratio: float = 9.0
     least: float = 0.005
     window: float = 0.5
     longest: int = 5
@@ -66,9 +69,16 @@ def find_outliers(positions: np.ndarray, rate: float, settings: OutlierSettings)
     if settings.method == "prominence":
         found = _by_prominence(positions, rate, settings)
     elif settings.method == "local" and len(positions) > 2:
-        found = _excursions(positions, rate, settings)
-        found |= _peaks(_bridged(positions, found), rate, settings)
+        found = _by_local_usage(positions, rate, settings)
     return np.asarray(found & np.isfinite(positions).all(axis=2))
+
+
+def _by_local_usage(positions: np.ndarray, rate: float, settings: OutlierSettings) -> np.ndarray:
+    """Excursions and single samples; then excursions from where the neighbours, mended by the first pass, lead."""
+    first = _excursions(positions, rate, settings)
+    first |= _peaks(_bridged(positions, first), rate, settings)
+    beside = beside_neighbours(positions, _bridged(positions, first))
+    return first | _excursions(beside, rate, settings)
 
 
 def _usual(size: np.ndarray, rate: float, settings: OutlierSettings) -> np.ndarray:
@@ -81,7 +91,7 @@ def _usual(size: np.ndarray, rate: float, settings: OutlierSettings) -> np.ndarr
     # An even number of frames would look further back than ahead.
     window = max(3, round(settings.window * rate) // 2 * 2 + 1)
     own: np.ndarray = median_filter(np.nan_to_num(size), size=(window, 1), mode="nearest")
-    return own + _median_of_frame(size)[:, None] + _FLOOR_M
+    return np.asarray(np.hypot(own, _median_of_frame(size)[:, None]) + _FLOOR_M)
 
 
 def _median_of_frame(size: np.ndarray) -> np.ndarray:
@@ -92,28 +102,37 @@ def _median_of_frame(size: np.ndarray) -> np.ndarray:
 
 
 def _peaks(positions: np.ndarray, rate: float, settings: OutlierSettings) -> np.ndarray:
-    """Single samples: peaks of the distance from the middle of the samples before and after."""
+    """Single samples: peaks of the distance from where the samples about them lead."""
     positions = positions.copy()
     found = np.zeros(positions.shape[:2], dtype=bool)
     usual: np.ndarray | None = None
     for _ in range(_ROUNDS):
-        size = np.full(found.shape, np.nan)
-        size[1:-1] = np.linalg.norm(positions[1:-1] - 0.5 * (positions[:-2] + positions[2:]), axis=2)
+        off = _off(positions)
+        size = np.linalg.norm(off, axis=2)
         usual = _usual(size, rate, settings) if usual is None else usual
-        # The samples beside an outlier have half its acceleration: only the top of each peak is cut.
+        # The samples beside an outlier are off by two thirds of it: only the top of each peak is cut.
         padded = np.pad(np.nan_to_num(size), ((2, 2), (0, 0)))
         top = np.max([padded[k : k + len(size)] for k in (0, 1, 3, 4)], axis=0)
-        new = (size > settings.ratio * usual) & (size > settings.least) & (size >= top) & _comes_back(size)
+        new = (size > settings.ratio * usual) & (size > settings.least) & (size >= top) & _comes_back(size) & ~found
         if not new.any():
             break
         found |= new
-        frame, marker = np.nonzero(new)
-        positions[frame, marker] = 0.5 * (positions[frame - 1, marker] + positions[frame + 1, marker])
+        positions[new] -= off[new]
     return found
 
 
+def _off(positions: np.ndarray) -> np.ndarray:
+    """(T, M, 3) m from the cubic through two samples on either side, or from the middle of one on either side."""
+    off = np.full_like(positions, np.nan)
+    off[1:-1] = positions[1:-1] - 0.5 * (positions[:-2] + positions[2:])
+    if len(positions) > 4:
+        cubic = positions[2:-2] - (4 * (positions[1:-3] + positions[3:-1]) - (positions[:-4] + positions[4:])) / 6
+        off[2:-2] = np.where(np.isfinite(cubic), cubic, off[2:-2])
+    return off
+
+
 def _comes_back(size: np.ndarray) -> np.ndarray:
-    """(T, M) True where the samples beside have about half as much: after a step that stays, one has as much."""
+    """(T, M) True where the samples beside are off by a half or two thirds: at a step that stays, one is as much."""
     beside = np.pad(size, ((1, 1), (0, 0)), constant_values=np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
         shares = [beside[k : k + len(size)] / size for k in (0, 2)]
@@ -130,7 +149,7 @@ def _excursions(positions: np.ndarray, rate: float, settings: OutlierSettings) -
     size = np.linalg.norm(jump, axis=2)
     usual = _usual(size, rate, settings)
     jump, size = np.nan_to_num(jump), np.nan_to_num(size)
-    big = (size > settings.ratio * usual) & (size > settings.least)
+    big = (size > _JUMP_SHARE * settings.ratio * usual) & (size > settings.least)
     for length in range(2, min(settings.longest, len(size) - 1) + 1):
         smaller = _AGREE * np.minimum(size[:-length], size[length:])
         returns = np.linalg.norm(jump[:-length] + jump[length:], axis=2) < smaller
