@@ -125,22 +125,27 @@ class Runner:
         self.changed.emit()
         return True
 
-    def poll(self) -> None:
-        """Pass on what has arrived; to be called some twenty times a second while something runs."""
+    def poll(self) -> bool:
+        """Pass on what has arrived; to be called some twenty times a second while something runs.
+
+        At most one stage begins or ends with a call, since much is drawn anew then. Returns whether one did.
+        """
         if self._work is None:
-            return
+            return False
+        turned = False
         before, waiting = self._work.at, self._work.waiting
         waiting.extend(self._work.job.poll())
         while waiting and self.running:
             message = waiting.popleft()
             self._take(message)
-            if isinstance(message, Event):
-                break  # much is drawn anew then: let that be done before the next one
-        if not self.running:
-            return
-        self._estimate()
-        if self._work.at != before:
-            self.progressed.emit(self._work.at)
+            turned = not isinstance(message, Progressed | Found)
+            if turned:
+                break
+        if self.running:
+            self._estimate()
+            if self._work.at != before:
+                self.progressed.emit(self._work.at)
+        return turned
 
     def cancel(self) -> None:
         """End the run; what it has finished stays."""

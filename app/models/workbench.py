@@ -102,8 +102,8 @@ class Workbench:
 
     def tick(self) -> None:
         """Let everything move on that has its own time: playing, running stages, results and frames that arrive."""
-        self.runner.poll()
-        self.board.results.poll()
+        if not self.runner.poll():  # else there is enough to draw for this time
+            self.board.results.poll()
         if self.frames is not None:
             self.frames.poll()
         if self._reading is not None and self._reading.done:

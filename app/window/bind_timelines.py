@@ -42,7 +42,7 @@ class TimelinesBinder:
         bench.clock.changed.connect(self._clock)
         bench.selection.changed.connect(self._select)
         bench.display.changed.connect(self._display)
-        self.fits.changed.connect(self._fill)
+        self.fits.changed.connect(lambda: self._filling.start())
         bench.opened.connect(self._opened)
         shown.changed.connect(self._changed)
         widget.seeked.connect(bench.clock.seek)
@@ -101,7 +101,7 @@ class TimelinesBinder:
         shown, found = self.shown, list[Row]()
         tracks, sync, seen, prior = shown.tracks, shown.get("sync"), shown.get("landmarks"), shown.get("prior")
         watched = seen if seen is not None else prior
-        if tracks is None:
+        if tracks is None or not self.bench.document.is_open:
             return found
         if sync is not None and watched is not None:
             found.append(shown.once("video row", (watched, sync), lambda: views.video_row(watched, sync)))

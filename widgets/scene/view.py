@@ -123,6 +123,11 @@ class Scene3D(Contents):
         return self._stage.problem
 
     @property
+    def software(self) -> bool:
+        """Whether a processor draws, not a graphics card."""
+        return self._stage.software
+
+    @property
     def fine(self) -> bool:
         """Whether the skins are seen as fine as there are."""
         return not self._stage.coarse
