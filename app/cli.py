@@ -24,10 +24,12 @@ from app.cli_commands import (
     run_evaluate,
     run_solve,
     run_synth,
+    run_train,
 )
 from app.cli_dataset import dataset_options
 from app.cli_endings import CANCELLED, REFUSED, ended
 from app.cli_synth import synth_options
+from app.cli_train import train_options
 from solver import __version__
 from solver.bench.request import OUT, names
 from solver.pipeline.request import Convention, Method, Units, Up, parse_range
@@ -39,6 +41,7 @@ COMMANDS = {
     "clean": "cut outliers and fill gaps of a marker file, every change listed",
     "bench": "how good the methods are on synthetic sessions whose truth is known",
     "synth": "make a session whose truth is known, as files",
+    "train": "train the network for a layout: a session's own, or one with a name",
     "dataset": "cut your own copy of a public dataset into sessions",
 }
 
@@ -122,6 +125,11 @@ def _parser() -> argparse.ArgumentParser:
     _common(synth)
     synth.set_defaults(run=run_synth)
 
+    train = commands.add_parser("train", help=COMMANDS["train"], description=_sentence("train"))
+    train_options(train)
+    _common(train)
+    train.set_defaults(run=run_train)
+
     dataset = commands.add_parser("dataset", help=COMMANDS["dataset"], description=_sentence("dataset"))
     dataset_options(dataset)
     _common(dataset)
@@ -151,7 +159,10 @@ def _solve_options(solve: argparse.ArgumentParser) -> None:
     timing.add_argument("--rate-ratio", type=float, metavar="R", help="see --offset; 1 where both clocks are right")
 
     how = solve.add_argument_group("solving")
-    how.add_argument("--method", choices=get_args(Method), help="bundle (default), or paper: Milef et al. (2024)")
+    how.add_argument(
+        "--method", choices=get_args(Method), help="bundle (default), paper: Milef et al. (2024), or neural"
+    )
+    how.add_argument("--weights", type=Path, metavar="FILE", help="of the network, instead of those that ship (neural)")
     how.add_argument("--iterations", type=int, metavar="N", help="of each optimisation at most (method paper)")
     how.add_argument("--convention", choices=get_args(Convention), help="names and signs of the angles")
     how.add_argument("--seed", type=int, metavar="N", help="of every random choice (default: 0)")

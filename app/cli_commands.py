@@ -11,11 +11,13 @@ from app.cli_clean import clean_request
 from app.cli_dataset import dataset_request
 from app.cli_output import Terminal
 from app.cli_synth import synth_settings
+from app.cli_train import train_request
 from resources import resource
 from solver.bench.request import BenchRequest
 from solver.clean.request import CleanRequest
 from solver.datasets.request import DatasetRequest
 from solver.errors import InputError
+from solver.neural.request import TrainRequest
 from solver.pipeline.request import EvaluateRequest, Outcome, SolveOutcome, SolveRequest, SynthRequest, check_inputs
 from solver.progress import Progress
 
@@ -65,6 +67,12 @@ def _clean(request: CleanRequest, progress: Progress) -> Outcome:
     return clean_file(request, progress)
 
 
+def _train(request: TrainRequest, progress: Progress) -> Outcome:
+    from solver.neural.command import train_network
+
+    return train_network(request, progress)
+
+
 def _no_window() -> str:
     from app.window.start import display_problem
 
@@ -88,6 +96,7 @@ class Services:
     synth: Callable[[SynthRequest, Progress], Outcome] = _synth
     dataset: Callable[[DatasetRequest, Progress], Outcome] = _dataset
     clean: Callable[[CleanRequest, Progress], Outcome] = _clean
+    train: Callable[[TrainRequest, Progress], Outcome] = _train
     no_window: Callable[[], str] = _no_window
     window: Callable[[Path | None, bool], int] = _window
 
@@ -165,6 +174,13 @@ def run_dataset(options: argparse.Namespace, services: Services) -> int:
     """``markerscope dataset``."""
     with Terminal(options) as terminal:
         terminal.show(services.dataset(dataset_request(options), terminal.progress))
+    return 0
+
+
+def run_train(options: argparse.Namespace, services: Services) -> int:
+    """``markerscope train``."""
+    with Terminal(options) as terminal:
+        terminal.show(services.train(train_request(options), terminal.progress))
     return 0
 
 

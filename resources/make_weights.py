@@ -14,8 +14,9 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
+from solver.neural.agnostic_solve import NETWORK
 from solver.neural.library import load_library
-from solver.neural.pretrain import NETWORK, PretrainSettings, pretrain
+from solver.neural.pretrain import PretrainSettings, pretrain
 from solver.neural.train import TrainSettings
 
 
@@ -41,7 +42,15 @@ def main() -> None:
         clips, training, settings, sizes, checkpoint=options.out.with_suffix(".checkpoint"), progress=_Lines()
     )
     card = Card(
-        NETWORK, asdict(sizes), "", (), tuple(options.data), found.figures, options.seed, found.steps, found.seconds
+        NETWORK,
+        {"sizes": asdict(sizes)},
+        "",
+        (),
+        tuple(options.data),
+        found.figures,
+        options.seed,
+        found.steps,
+        found.seconds,
     )
     save_weights(options.out, {name: value.half() for name, value in found.params.items()}, card)
     print(json.dumps(found.figures))

@@ -87,4 +87,5 @@ RUN_ACTIONS = (
     Action("run.stop", "Stop", "Run", "Stop what runs; what is finished stays.", _stop, "Ctrl+.", _nothing_runs),
     _method("bundle", "Default method", "Fit by bundle adjustment with the video's landmarks."),
     _method("paper", "Published method", "Fit as Milef et al. (2024) did, for comparison."),
+    _method("neural", "Network", "Have a trained network read the poses off the markers, then refine them."),
 )

@@ -34,6 +34,7 @@ INPUTS = {
     "prior_file": "pose prior",
     "camera_file": "camera",
     "body_file": "body",
+    "weights_file": "network's weights",
 }
 
 
@@ -127,7 +128,7 @@ def unpin_candidate(session: Session) -> Edit:
 
 def set_method(session: Session, method: Method) -> Edit:
     """Solve by another method; what belongs to the old one alone goes."""
-    names = {"bundle": "the default method", "paper": "the published method"}
+    names = {"bundle": "the default method", "paper": "the published method", "neural": "the network"}
     return Edit(f"Solve by {names.get(method, method)}", solved_by(session, method))
 
 

@@ -25,6 +25,7 @@ TITLES = {
     "localize": "Localization",
     "solve": "Solving",
     "orient": "Orientation",
+    "network": "Network",
     "fit": "Fit",
     "angles": "Joint angles",
     "surface": "Distance to the skin",

@@ -10,17 +10,20 @@ idea of what bodies do are learned too.
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import torch
-from torch import Tensor, nn
+from typing import TYPE_CHECKING
 
 from solver.body.skeleton import JOINTS, PARENTS
 from solver.neural import kinematics
 from solver.neural.agnostic_moments import COMPARED, OBSERVED, compared, observed
-from solver.neural.examples import skinned
+from solver.neural.examples import generator, skinned
+from solver.neural.train import Params
+
+if TYPE_CHECKING:
+    from torch import Generator, Tensor
 
 BONES = len(JOINTS)
-_ABOVE = torch.tensor([max(int(p), 0) for p in PARENTS])
+_ABOVE = [max(int(p), 0) for p in PARENTS]
+_NAME, _HIDDEN = 8, 64  # numbers that stand for a bone, and of the layer between, where a marker makes its message
 
 
 @dataclass(frozen=True)
@@ -81,72 +84,103 @@ class Posed:
     markers: Tensor
 
 
-class AgnosticSolver(nn.Module):
-    """See the module. ``forward`` returns the pose after each step, the last one being the answer."""
+@dataclass(frozen=True)
+class Agnostic:
+    """See the module: a pure function of its numbers and of frames."""
 
-    def __init__(self, settings: AgnosticSettings | None = None) -> None:
-        super().__init__()
-        self.settings = own = settings or AgnosticSettings()
-        self.message = nn.Sequential(nn.Linear(6 + 8, 64), nn.SiLU(), nn.Linear(64, own.message))
-        self.names = nn.Parameter(0.3 * torch.randn(BONES, 8))
-        self.first = _Bones(OBSERVED + own.message, own.bone, own.width, own.blocks, BONES * 6 + 3)
-        self.mending = nn.ModuleList(
-            _Bones(COMPARED, own.bone, own.mend_width, 1, BONES * 3 + 3) for _ in range(own.mends)
-        )
+    settings: AgnosticSettings = AgnosticSettings()
 
-    def forward(self, frames: Frames) -> list[Posed]:
-        """The pose after each step."""
+    def initial(self, seed: int) -> Params:
+        """Numbers to begin with."""
+        import torch
+
+        own, random, params = self.settings, generator(seed), Params()
+        params["names"] = 0.3 * torch.randn(BONES, _NAME, generator=random)
+        _new_linear(params, "message.0", 6 + _NAME, _HIDDEN, random)
+        _new_linear(params, "message.2", _HIDDEN, own.message, random)
+        _new_bones(params, "first", OBSERVED + own.message, own.bone, own.width, own.blocks, BONES * 6 + 3, random)
+        for k in range(own.mends):
+            _new_bones(params, f"mending.{k}", COMPARED, own.bone, own.mend_width, 1, BONES * 3 + 3, random)
+        return params
+
+    def __call__(self, params: Params, frames: Frames) -> list[Posed]:
+        """The pose after each step, the last one being the answer."""
+        import torch
+
         share = (frames.weights * frames.seen[..., None]).transpose(1, 2)
-        poses = [self._posed(frames, *self._start(frames, share))]
+        poses = [_posed(frames, *self._start(params, frames, share))]
         bone = frames.joints - frames.joints[:, _ABOVE]
-        for mend in self.mending:
+        for k in range(self.settings.mends):
             last = poses[-1]
             gap = (frames.markers - last.markers) * frames.seen[..., None]
             extra = torch.cat([last.local.flatten(2), bone], dim=2)
-            step = mend(compared(share, last.markers, gap, last.turn, last.place, extra))
+            known = compared(share, last.markers, gap, last.turn, last.place, extra)
+            step = _bones(params, f"mending.{k}", known, 1)
             turned = last.local @ kinematics.exp(0.2 * step[:, :-3].unflatten(1, (BONES, 3)))
             moved = last.root + 0.05 * (last.turn[:, 0] @ step[:, -3:, None])[..., 0]
-            poses.append(self._posed(frames, turned, moved))
+            poses.append(_posed(frames, turned, moved))
         return poses
 
-    def _start(self, frames: Frames, share: Tensor) -> tuple[Tensor, Tensor]:
-        told = self.message(torch.cat([frames.markers, frames.rest, frames.weights @ self.names], dim=2))
+    def _start(self, params: Params, frames: Frames, share: Tensor) -> tuple[Tensor, Tensor]:
+        import torch
+
+        told = torch.cat([frames.markers, frames.rest, frames.weights @ params["names"]], dim=2)
+        told = _linear(params, "message.2", torch.nn.functional.silu(_linear(params, "message.0", told)))
         told = (share @ told) / (share.sum(2, keepdim=True) + 1e-3)
         known = observed(share, frames.markers, frames.rest, frames.joints, frames.joints[:, _ABOVE])
-        out = self.first(torch.cat([known, told], dim=2))
+        out = _bones(params, "first", torch.cat([known, told], dim=2), self.settings.blocks)
         identity = out.new_tensor([1.0, 0, 0, 0, 1, 0])
         return kinematics.orthonormal(out[:, :-3].unflatten(1, (BONES, 6)) + identity), 0.1 * out[:, -3:]
 
-    @staticmethod
-    def _posed(frames: Frames, local: Tensor, root: Tensor) -> Posed:
-        bones = kinematics.bones_of(frames.joints)
-        bones[:, 0] = root
-        turn, place = kinematics.forward(local, bones)
-        return Posed(local, root, turn, place, skinned(turn, place, frames.joints, frames.rest, frames.weights))
+
+def _posed(frames: Frames, local: Tensor, root: Tensor) -> Posed:
+    bones = kinematics.bones_of(frames.joints)
+    bones[:, 0] = root
+    turn, place = kinematics.forward(local, bones)
+    return Posed(local, root, turn, place, skinned(turn, place, frames.joints, frames.rest, frames.weights))
 
 
-class _Bones(nn.Module):
-    """From what is known of each bone to something about all of them: bones one by one, then all together."""
+def _bones(params: Params, name: str, known: Tensor, blocks: int) -> Tensor:
+    """From what is known of each bone (B, 24, inputs) to something about all: bones one by one, then together."""
+    import torch
 
-    def __init__(self, inputs: int, bone: int, width: int, blocks: int, outputs: int) -> None:
-        super().__init__()
-        self.weight = nn.Parameter(torch.randn(BONES, inputs, bone) / inputs**0.5)
-        self.bias = nn.Parameter(torch.zeros(BONES, 1, bone))
-        self.join = nn.Linear(BONES * bone, width)
-        self.blocks = nn.ModuleList(
-            nn.Sequential(nn.LayerNorm(width), nn.Linear(width, width), nn.SiLU(), nn.Linear(width, width))
-            for _ in range(blocks)
-        )
-        self.out = nn.Linear(width, outputs)
-        nn.init.zeros_(self.out.bias)
-        with torch.no_grad():
-            self.out.weight *= 0.1
+    silu = torch.nn.functional.silu
+    each = silu(known.transpose(0, 1) @ params[f"{name}.weight"] + params[f"{name}.bias"])
+    x = silu(_linear(params, f"{name}.join", each.transpose(0, 1).flatten(1)))
+    for k in range(blocks):
+        scale, shift = (params[f"{name}.blocks.{k}.0.{kind}"] for kind in ("weight", "bias"))
+        normed = torch.nn.functional.layer_norm(x, x.shape[1:], scale, shift)
+        x = x + _linear(params, f"{name}.blocks.{k}.3", silu(_linear(params, f"{name}.blocks.{k}.1", normed)))
+    return _linear(params, f"{name}.out", x)
 
-    def forward(self, known: Tensor) -> Tensor:
-        """(B, 24, inputs) to (B, outputs)."""
-        each = nn.functional.silu(known.transpose(0, 1) @ self.weight + self.bias)
-        all_ = nn.functional.silu(self.join(each.transpose(0, 1).flatten(1)))
-        for block in self.blocks:
-            all_ = all_ + block(all_)
-        out: Tensor = self.out(all_)
-        return out
+
+def _linear(params: Params, name: str, x: Tensor) -> Tensor:
+    import torch
+
+    return torch.nn.functional.linear(x, params[f"{name}.weight"], params[f"{name}.bias"])
+
+
+def _new_bones(
+    params: Params, name: str, inputs: int, bone: int, width: int, blocks: int, outputs: int, random: Generator
+) -> None:
+    import torch
+
+    params[f"{name}.weight"] = torch.randn(BONES, inputs, bone, generator=random) / inputs**0.5
+    params[f"{name}.bias"] = torch.zeros(BONES, 1, bone)
+    _new_linear(params, f"{name}.join", BONES * bone, width, random)
+    for k in range(blocks):
+        params[f"{name}.blocks.{k}.0.weight"] = torch.ones(width)
+        params[f"{name}.blocks.{k}.0.bias"] = torch.zeros(width)
+        _new_linear(params, f"{name}.blocks.{k}.1", width, width, random)
+        _new_linear(params, f"{name}.blocks.{k}.3", width, width, random)
+    _new_linear(params, f"{name}.out", width, outputs, random)
+    params[f"{name}.out.weight"] *= 0.1
+    params[f"{name}.out.bias"] *= 0.0
+
+
+def _new_linear(params: Params, name: str, inputs: int, outputs: int, random: Generator) -> None:
+    """Evenly between plus and minus the root of one over the inputs."""
+    import torch
+
+    for kind, shape in (("weight", (outputs, inputs)), ("bias", (outputs,))):
+        params[f"{name}.{kind}"] = (2 * torch.rand(shape, generator=random) - 1) / inputs**0.5

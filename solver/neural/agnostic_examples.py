@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
-from torch import Generator, Tensor
 
 from solver.body.skeleton import JOINTS, PARENTS, descendants
 from solver.neural import kinematics
 from solver.neural.agnostic import Frames
 from solver.neural.agnostic_align import align_to_rest
 from solver.neural.agnostic_layouts import Skin
-from solver.neural.examples import Examples, Sampler
+from solver.neural.agnostic_solve import Marked
+from solver.neural.examples import Examples, Sampler, skinned
 from solver.neural.layout import Layout
+
+if TYPE_CHECKING:
+    from torch import Generator, Tensor
 
 _FEWEST, _MOST = 20, 60
 _ENOUGH, _HARDLY = 0.3, 0.1
@@ -80,6 +83,8 @@ def any_layout(
     parts: float = 0.1,
 ) -> Task:
     """Frames of random bodies, each with a layout of its own; a share of them of one part of the body alone."""
+    import torch
+
     rng = numbers_of(generator)
     vertex, there = skin.layouts(count, int(rng.integers(_FEWEST, _MOST + 1)), rng, parts)
     index = torch.as_tensor(vertex)
@@ -91,9 +96,30 @@ def one_layout(
     sampler: Sampler, layout: Layout, count: int, generator: Generator, spoiling: Spoiling = Spoiling()
 ) -> Task:
     """Frames of random bodies with the same layout."""
+    import torch
+
     drawn = sampler.draw(layout, count, generator)
     weights = sampler.pool.weights[torch.as_tensor(layout.vertex)].expand(count, -1, -1)
     return spoilt(drawn, weights, np.ones((count, len(layout)), dtype=bool), numbers_of(generator), spoiling)
+
+
+def one_person(
+    poses: Sampler, person: Marked, count: int, generator: Generator, spoiling: Spoiling = Spoiling()
+) -> Task:
+    """Frames of one body with its markers, in poses of a sampler's."""
+    import torch
+
+    local, place = poses.poses(count, generator)
+    joints, rest, weights = (
+        torch.as_tensor(array, dtype=torch.float32).expand(count, *array.shape)
+        for array in (person.joints, person.rest, person.weights)
+    )
+    bones = kinematics.bones_of(joints)
+    bones[:, 0] = joints[:, 0] + place
+    turn, there = kinematics.forward(local, bones)
+    markers = skinned(turn, there, joints, rest, weights)
+    drawn = Examples(markers, local, there, joints, rest)
+    return spoilt(drawn, weights, np.ones(rest.shape[:2], dtype=bool), numbers_of(generator), spoiling)
 
 
 def spoilt(drawn: Examples, weights: Tensor, there: np.ndarray, rng: np.random.Generator, spoiling: Spoiling) -> Task:
@@ -104,6 +130,8 @@ def spoilt(drawn: Examples, weights: Tensor, there: np.ndarray, rng: np.random.G
     weights : (B, M, 24)
     there : (B, M) False where there is no marker
     """
+    import torch
+
     clean, count = drawn.markers.numpy(), len(there)
     share = rng.random((5, count), np.float32) ** np.float32(1.5)
 
@@ -134,6 +162,8 @@ def told(frames: Frames) -> tuple[Tensor, Tensor]:
 
     A rotation is by markers on both sides of the joint, a place by markers on a bone that ends there.
     """
+    import torch
+
     own = (frames.weights * frames.seen[..., None]).sum(1)
     below = own @ torch.as_tensor(descendants(), dtype=own.dtype).T
     least = torch.minimum(below, own.sum(1, keepdim=True) - below)
@@ -145,8 +175,12 @@ def told(frames: Frames) -> tuple[Tensor, Tensor]:
 
 def numbers_of(generator: Generator) -> np.random.Generator:
     """A generator of numpy's that goes on from one of torch's."""
+    import torch
+
     return np.random.default_rng(int(torch.randint(2**62, (1,), generator=generator)))
 
 
 def _tensor(array: np.ndarray) -> Tensor:
+    import torch
+
     return torch.as_tensor(array, dtype=torch.float32)

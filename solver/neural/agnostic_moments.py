@@ -6,12 +6,13 @@ skinning weights where it is seen, 0 where it is lost.
 
 from __future__ import annotations
 
-import torch
-from torch import Tensor
+from typing import TYPE_CHECKING
 
 from solver.body.skeleton import descendants
 
-_BELOW = torch.tensor(descendants(), dtype=torch.float32)
+if TYPE_CHECKING:
+    from torch import Tensor
+
 _RIDGE = 4e-4
 """m2, two centimetres squared: markers nearer to each other than that say little about a rotation."""
 
@@ -29,6 +30,8 @@ def observed(share: Tensor, markers: Tensor, rest: Tensor, joints: Tensor, paren
     markers, rest : (B, M, 3) m
     joints, parents : (B, 24, 3) m at rest, each joint and its parent
     """
+    import torch
+
     outer = (markers[..., :, None] * rest[..., None, :]).flatten(2)
     square = (rest[..., :, None] * rest[..., None, :]).flatten(2)
     ones = torch.ones_like(markers[..., :1])
@@ -67,15 +70,20 @@ def compared(share: Tensor, placed: Tensor, gap: Tensor, turn: Tensor, place: Te
     turn, place : (B, 24, 3, 3) and (B, 24, 3) m of the pose
     extra : (B, 24, 12), handed on
     """
+    import torch
+
+    below = torch.as_tensor(descendants(), dtype=gap.dtype)
     moment = torch.linalg.cross(placed, gap)
     square = (placed[..., :, None] * placed[..., None, :]).flatten(2)
     ones = torch.ones_like(gap[..., :1])
     own = share @ torch.cat([ones, gap, moment, placed, square], dim=2)
-    return torch.cat([_mending(own, turn, place), _mending(_BELOW @ own, turn, place), extra], dim=2)
+    return torch.cat([_mending(own, turn, place), _mending(below @ own, turn, place), extra], dim=2)
 
 
 def _mending(sums: Tensor, turn: Tensor, place: Tensor) -> Tensor:
     """(B, 24, 17) of sums over markers: count, mean error, mean lever, mending rotation, how well it is known."""
+    import torch
+
     count, force, moment, first = sums[..., :1], sums[..., 1:4], sums[..., 4:7], sums[..., 7:10]
     second = sums[..., 10:].unflatten(2, (3, 3))
     torque = moment - torch.linalg.cross(place, force)
@@ -104,11 +112,15 @@ def _mending(sums: Tensor, turn: Tensor, place: Tensor) -> Tensor:
 
 def _upper(matrix: Tensor) -> Tensor:
     """(..., 6) of a symmetric (..., 3, 3)."""
+    import torch
+
     return torch.stack([matrix[..., i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))], dim=-1)
 
 
 def _inverse(matrix: Tensor) -> Tensor:
     """(..., 3, 3) inverses by cross products: many small ones, quicker than a factorisation each."""
+    import torch
+
     a, b, c = matrix[..., 0, :], matrix[..., 1, :], matrix[..., 2, :]
     bc = torch.linalg.cross(b, c)
     columns = torch.stack([bc, torch.linalg.cross(c, a), torch.linalg.cross(a, b)], dim=-1)

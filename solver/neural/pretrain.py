@@ -21,14 +21,12 @@ from solver.progress import Progress, silent
 if TYPE_CHECKING:
     from torch import Generator, Tensor
 
-    from solver.neural.agnostic import AgnosticSettings, AgnosticSolver, Posed
+    from solver.neural.agnostic import Agnostic, AgnosticSettings, Posed
     from solver.neural.agnostic_examples import Task
     from solver.neural.train import Params
 
     Draw = Callable[[Generator], Task]
 
-NETWORK = "agnostic"
-"""Its name on cards."""
 _EARLIER = (0.25, 0.25, 0.5)
 """How much the poses before the last count in the loss."""
 _METRE, _MARKER = 6.0, 2.0
@@ -88,23 +86,23 @@ def figures_of(posed: Posed, task: Task) -> dict[str, float]:
     return {"joe_deg": turn, "jpe_cm": place, "score": turn + 4 * place}
 
 
-def objective(network: AgnosticSolver, draw: Draw) -> Callable[[Params, Generator], dict[str, Tensor]]:
+def objective(network: Agnostic, draw: Draw) -> Callable[[Params, Generator], dict[str, Tensor]]:
     """The loss of a network's parameters on frames that ``draw`` makes from a generator."""
-    from torch.func import functional_call
 
     def loss(params: Params, numbers: Generator) -> dict[str, Tensor]:
         task = draw(numbers)
-        return loss_terms(functional_call(network, params, (task.frames,)), task)
+        return loss_terms(network(params, task.frames), task)
 
     return loss
 
 
-def judged_on(network: AgnosticSolver, tasks: Sequence[Task]) -> Callable[[Params], dict[str, float]]:
+def judged_on(network: Agnostic, tasks: Sequence[Task]) -> Callable[[Params], dict[str, float]]:
     """The figures of a network's parameters on given frames, the mean over the tasks."""
-    from torch.func import functional_call
+    import torch
 
     def judge(params: Params) -> dict[str, float]:
-        rows = [figures_of(functional_call(network, params, (task.frames,))[-1], task) for task in tasks]
+        with torch.no_grad():
+            rows = [figures_of(network(params, task.frames)[-1], task) for task in tasks]
         return {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
 
     return judge
@@ -120,9 +118,7 @@ def pretrain(
     progress: Progress = silent,
 ) -> Trained:
     """Train on random layouts and bodies in poses of clips (the last tenth of each is only judged on) and made ones."""
-    import torch
-
-    from solver.neural.agnostic import AgnosticSolver
+    from solver.neural.agnostic import Agnostic, AgnosticSettings
     from solver.neural.agnostic_examples import CLEAN, Spoiling, any_layout
     from solver.neural.agnostic_layouts import Skin
     from solver.neural.examples import ExampleSettings, Sampler, body_pool, generator
@@ -142,9 +138,15 @@ def pretrain(
     tasks = [
         any_layout(others, skin, 256, generator(settings.seed + 1, i), mild if i % 2 else CLEAN, 0.0) for i in range(4)
     ]
-    torch.manual_seed(settings.seed)
-    network = AgnosticSolver(sizes)
+    network = Agnostic(sizes or AgnosticSettings())
     loss = objective(network, lambda numbers: any_layout(sampler, skin, settings.batch, numbers))
-    start = dict(network.named_parameters())
     what = json.dumps([asdict(settings), asdict(network.settings), [clip.name for clip in clips]])
-    return train(start, loss, judged_on(network, tasks), training, checkpoint=checkpoint, what=what, progress=progress)
+    return train(
+        network.initial(settings.seed),
+        loss,
+        judged_on(network, tasks),
+        training,
+        checkpoint=checkpoint,
+        what=what,
+        progress=progress,
+    )

@@ -12,9 +12,10 @@ from solver.pipeline.request import Method
 from solver.pipeline.session import Session
 from solver.pipeline.stage import Stage
 from solver.pipeline.stages import GRAPH
+from solver.pipeline.stages_neural import GRAPH_NEURAL
 from solver.pipeline.stages_paper import GRAPH_PAPER
 
-GRAPHS: dict[Method, tuple[Stage, ...]] = {"bundle": GRAPH, "paper": GRAPH_PAPER}
+GRAPHS: dict[Method, tuple[Stage, ...]] = {"bundle": GRAPH, "paper": GRAPH_PAPER, "neural": GRAPH_NEURAL}
 
 
 def graph_of(session: Session) -> tuple[Stage, ...]:

@@ -13,7 +13,7 @@ from solver.errors import InputError
 
 Up = Literal["x", "y", "z"]
 Units = Literal["m", "cm", "mm"]
-Method = Literal["bundle", "paper"]
+Method = Literal["bundle", "paper", "neural"]
 Convention = Literal["opensim", "isb", "gait2392", "visual3d", "plugin-gait"]
 
 
@@ -38,6 +38,7 @@ class SolveRequest:
     iterations : of each optimisation at most, for the paper's method
     seed : of every random choice
     body : a user's own SMPL-layout model instead of the embedded body
+    weights : of the network, instead of those that ship, for the method with a network
     convention : names and signs of the angles
     """
 
@@ -57,6 +58,7 @@ class SolveRequest:
     iterations: int | None = None
     seed: int | None = None
     body: Path | None = None
+    weights: Path | None = None
     convention: Convention | None = None
 
     def __post_init__(self) -> None:

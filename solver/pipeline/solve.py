@@ -83,7 +83,7 @@ def session_of(request: SolveRequest) -> Session:
         raise InputError("no folder for the results was named", remedy="add --out DIR")
     else:
         session = _with_input(_again(out, request), "marker_file", request.markers)
-    for name in ("video", "prior", "camera", "body"):
+    for name in ("video", "prior", "camera", "body", "weights"):
         path = getattr(request, name)
         if path is not None:
             session = _with_input(session, f"{name}_file", camera_file(path) if name == "camera" else path)

@@ -19,7 +19,7 @@ from solver.surface import SurfaceDistance
 from solver.sync import Sync
 from solver.video.landmarks import Landmarks
 
-SOURCES = ("marker_file", "video_file", "prior_file", "camera_file", "body_file")
+SOURCES = ("marker_file", "video_file", "prior_file", "camera_file", "body_file", "weights_file")
 """The files a session is made from, by the names ``session.toml`` has for them."""
 
 

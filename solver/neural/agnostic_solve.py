@@ -1,0 +1,195 @@
+"""The layout-agnostic network put to use: weights from a file or the shipped ones, poses of every frame of a take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from resources import resource
+from solver.body.skeleton import JOINTS, PARENTS, descendants
+from solver.errors import InputError
+from solver.neural.weights import Card, load_weights
+from solver.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from solver.neural.agnostic import Agnostic
+    from solver.neural.train import Params
+
+NETWORK = "agnostic"
+"""The network's name on cards."""
+SHIPPED = resource("neural", "agnostic.safetensors")
+_AT_ONCE = 512
+_ENOUGH = 0.3
+"""Of a marker, so much on a bone tells of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Marked:
+    """A body and where its markers are.
+
+    Attributes
+    ----------
+    rest : (M, 3) m, the markers on the shaped body at rest
+    weights : (M, 24) the bones that carry each, summing to 1
+    joints : (24, 3) m, joints at rest
+    """
+
+    rest: np.ndarray
+    weights: np.ndarray
+    joints: np.ndarray
+
+    def take(self, index: np.ndarray) -> Marked:
+        """Some of the markers."""
+        return Marked(self.rest[index], self.weights[index], self.joints)
+
+    @cached_property
+    def own(self) -> np.ndarray:
+        """(24,) how many markers each bone carries."""
+        return np.asarray(self.weights.sum(axis=0))
+
+    @property
+    def turned(self) -> np.ndarray:
+        """(24,) True for bones whose rotation in the lab the markers tell: they carry some, or lie between two such."""
+        below = descendants() @ self.own
+        return (self.own > _ENOUGH) | ((below > _ENOUGH) & (self.own.sum() - below > _ENOUGH))
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Poses as the network says them, lab frame; see ``Body.pose``.
+
+    Attributes
+    ----------
+    rotations : (T, 24, 3, 3)
+    trans : (T, 3) m
+    seen : (T,) False where fewer than 3 markers are: such frames hold what the frames beside them say
+    """
+
+    rotations: np.ndarray
+    trans: np.ndarray
+    seen: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Ready:
+    """A network with its numbers, and their card."""
+
+    network: Agnostic
+    params: Params
+    card: Card
+
+
+def load(path: str | Path | None = None) -> Ready:
+    """A network ready for use, and the card of its weights; None takes the shipped ones.
+
+    Raises
+    ------
+    InputError : torch is not there, or the file holds no weights of such a network
+    """
+    from solver.neural.agnostic import Agnostic, AgnosticSettings
+
+    require_torch()
+    params, card = load_weights(SHIPPED if path is None else path, network=NETWORK)
+    try:
+        network = Agnostic(AgnosticSettings(**card.config["sizes"]))
+        wanted = {name: value.shape for name, value in network.initial(0).items()}
+    except (KeyError, TypeError, ValueError, RuntimeError):
+        wanted = {}
+    if not wanted or wanted != {name: value.shape for name, value in params.items()}:
+        raise InputError("holds the weights of another version of the network", path or SHIPPED, "train it again")
+    return Ready(network, {name: value.float() for name, value in params.items()}, card)
+
+
+def require_torch() -> None:
+    """Say what is missing.
+
+    Raises
+    ------
+    InputError : torch is not there
+    """
+    try:
+        import torch  # noqa: F401
+    except ImportError as error:
+        raise InputError("networks need torch, which is not installed", None, "pip install torch") from error
+
+
+def solve_frames(ready: Ready, markers: np.ndarray, body: Marked, progress: Progress = silent) -> Solved:
+    """Poses of all frames of a take, each by itself.
+
+    Parameters
+    ----------
+    markers : (T, M, 3) m in the lab, NaN = lost
+    body : with these markers
+    """
+    import torch
+
+    from solver.neural.agnostic import Frames
+    from solver.neural.agnostic_align import align_to_rest
+
+    count, frames = markers.shape[1], len(markers)
+    rest, joints = body.rest - body.joints[0], body.joints - body.joints[0]
+    rotations, root = np.empty((frames, len(JOINTS), 3, 3)), np.empty((frames, 3))
+    with torch.inference_mode():
+        for first in range(0, frames, _AT_ONCE):
+            progress(first / frames, "the network solves")
+            part = markers[first : first + _AT_ONCE]
+            aligned, R, t = align_to_rest(part, rest, body.weights)
+
+            def same(array: np.ndarray, many: int = len(part)) -> torch.Tensor:
+                return torch.as_tensor(array, dtype=torch.float32).expand(many, *array.shape)
+
+            given = Frames(
+                torch.as_tensor(aligned, dtype=torch.float32),
+                torch.as_tensor(np.isfinite(part).all(axis=2), dtype=torch.float32),
+                same(rest),
+                same(body.weights),
+                same(joints),
+            )
+            found = ready.network(ready.params, given)[-1]
+            local = found.local.numpy().astype(float)
+            local[:, 0] = R @ local[:, 0]
+            rotations[first : first + len(part)] = local
+            root[first : first + len(part)] = np.einsum("tij,tj->ti", R, found.root.numpy()) + t
+    seen = np.isfinite(markers).all(axis=2).sum(axis=1) >= min(3, count)
+    return _held(Solved(rotations, root - body.joints[0], seen))
+
+
+def _held(solved: Solved) -> Solved:
+    """Frames without markers as the frames beside them have it."""
+    from solver.rotations import slerp
+
+    if solved.seen.all() or not solved.seen.any():
+        return solved
+    frames, known = np.arange(len(solved.seen), dtype=float), np.flatnonzero(solved.seen)
+    lost = np.flatnonzero(~solved.seen)
+    rotations, trans = solved.rotations.copy(), solved.trans.copy()
+    rotations[lost] = slerp(solved.rotations[known], frames[known], frames[lost])
+    for k in range(3):
+        trans[lost, k] = np.interp(frames[lost], frames[known], solved.trans[known, k])
+    return Solved(rotations, trans, solved.seen)
+
+
+def completed(solved: Solved, known: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(T, 24, 3, 3): the network's rotation of each bone in the lab where markers tell it, else another pose's joint.
+
+    Parameters
+    ----------
+    known : (24,) True where the network counts
+    other : (T, 24, 3, 3) poses from elsewhere, the root in the lab
+    """
+    if known.all():
+        return solved.rotations
+    world, mine = np.empty_like(solved.rotations), np.empty_like(solved.rotations)
+    for j in range(len(JOINTS)):
+        parent = int(PARENTS[j])
+        own = solved.rotations[:, j]
+        mine[:, j] = own if parent < 0 else mine[:, parent] @ own
+        elsewhere = other[:, j] if parent < 0 else world[:, parent] @ other[:, j]
+        world[:, j] = mine[:, j] if known[j] else elsewhere
+    local = world.copy()
+    local[:, 1:] = np.swapaxes(world[:, PARENTS[1:]], -1, -2) @ world[:, 1:]
+    return local

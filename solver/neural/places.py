@@ -1,0 +1,59 @@
+"""Whether weights that were trained for one layout are used with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from solver.body.model import Body
+from solver.errors import InputError
+from solver.neural.weights import Card
+
+_NEAR = 0.06
+"""m on the mean body: a marker as far as this from a trained place is the same one, put on by another hand."""
+_SHARE = 0.8
+"""Of the markers that must have a trained place."""
+
+
+def places_of(body: Body, vertex: np.ndarray) -> dict[str, Any]:
+    """What a card says of the layout: the body, and the vertex below each marker."""
+    return {"body": body.digest, "vertex": [int(v) for v in vertex]}
+
+
+def check_places(card: Card, body: Body, vertex: np.ndarray, path: Path | None) -> None:
+    """Refuse weights that were trained for another layout.
+
+    Parameters
+    ----------
+    vertex : (M,) vertices below the markers that there are
+    path : of the weights, for the message
+
+    Raises
+    ------
+    InputError : they are for another layout, or for another body
+    """
+    trained = card.config.get("places")
+    if not trained:
+        return
+    if trained["body"] != body.digest:
+        raise InputError("was trained on another body model", path, "solve with that body, or train on this one")
+    known = same_places(body, vertex, np.array(trained["vertex"], int))
+    if known < _SHARE * len(vertex):
+        raise InputError(
+            f"was trained for another layout: only {known} of these {len(vertex)} markers sit where its "
+            f"{len(trained['vertex'])} do",
+            path,
+            "train on this session, or leave --weights out",
+        )
+
+
+def same_places(body: Body, vertex: np.ndarray, trained: np.ndarray) -> int:
+    """How many of the markers have a trained one near, each another."""
+    from scipy.optimize import linear_sum_assignment
+    from scipy.spatial.distance import cdist
+
+    apart = cdist(body.template[vertex], body.template[trained])
+    rows, columns = linear_sum_assignment(np.minimum(apart, 10 * _NEAR))
+    return int((apart[rows, columns] < _NEAR).sum())
