@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +41,7 @@ class Shown:
         self._compared: dict[Ref, Any] = {}
         self._made: dict[str, tuple[Any, Any]] = {}
         self._bodies: dict[Path | None, Body] = {}
+        self._coming: threading.Thread | None = None
         bench.board.changed.connect(self.follow)
         bench.document.changed.connect(self._begin_anew)
 
@@ -47,6 +50,8 @@ class Shown:
             gone = frozenset(self._refs)
             self._refs, self._values, self._compared, self._made = {}, {}, {}, {}
             self.changed.emit(gone)
+            if self.bench.document.is_open:
+                self._load_body_ahead()
             self.follow()
 
     def follow(self) -> None:
@@ -136,14 +141,34 @@ class Shown:
         """The session's body, with free bone lengths."""
         if self._bodies and not self.bench.document.is_open:  # views clear themselves one after the other
             return next(iter(self._bodies.values()))
-        given = self.bench.document.session.inputs.get("body_file")
-        path = None if given is None else given.path
+        path = self._body_file()
+        if self._coming is not None and path not in self._bodies:
+            self._coming.join()
         if path not in self._bodies:
-            from solver.body.bones import with_bone_lengths
-            from solver.body.model import Body
-
-            self._bodies = {path: with_bone_lengths(Body.load(path))}
+            self._load_body(path)  # again where it could not be had, so that whoever asks hears why
         return self._bodies[path]
+
+    def _body_file(self) -> Path | None:
+        given = self.bench.document.session.inputs.get("body_file")
+        return None if given is None else given.path
+
+    def _load_body(self, path: Path | None) -> None:
+        from solver.body.bones import with_bone_lengths
+        from solver.body.model import Body
+
+        self._bodies = {path: with_bone_lengths(Body.load(path))}
+
+    def _load_body_ahead(self) -> None:
+        """Have the body at hand before the first fit is to be drawn: reading it takes longer than a picture may."""
+
+        def load(path: Path | None) -> None:
+            with suppress(Exception):
+                self._load_body(path)
+
+        path = self._body_file()
+        if path not in self._bodies and (self._coming is None or not self._coming.is_alive()):
+            self._coming = threading.Thread(target=load, args=(path,), name="body", daemon=True)
+            self._coming.start()
 
     @property
     def track(self) -> BodyTrack | None:
