@@ -37,7 +37,8 @@ class Importing:
         self.up = cast(UpAxis, choice.up) if choice.up != now.up or self.up is not None else None
         self.units = choice.units if choice.units != now.units or self.units is not None else None
         self.subject = choice.subject if choice.subject and choice.subject != now.subject else self.subject
-        self.rate = choice.rate if choice.rate > 0 and (choice.rate != now.rate or self.rate is not None) else None
+        said = choice.rate != now.rate or not now.rate_known or self.rate is not None
+        self.rate = choice.rate if choice.rate > 0 and said else None
         try:
             self.preview = preview_of(
                 self.raw,
@@ -103,7 +104,7 @@ def _shown(path: Path, preview: ImportPreview) -> ImportShown:
         units_declared=preview.units_declared,
         up=preview.up,
         up_declared=preview.up_declared,
-        rate=preview.rate,
+        rate=preview.rate if preview.rate_known else 0.0,
         rate_known=preview.rate_known,
         subjects=preview.subjects,
         subject=preview.subject,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
 from app.cli_commands import DEMO_VIDEO
@@ -101,13 +102,40 @@ def spin(qapp: QApplication) -> Callable[..., None]:
 
 
 @pytest.fixture
-def open_window(qapp: QApplication, tmp_path: Path) -> Iterator[Callable[[], MainWindow]]:
-    """Opens a window of the same user; all are closed in the end."""
+def answer(qapp: QApplication) -> Iterator[Callable[[Callable[[Any], None]], None]]:
+    """``answer(act)``: act on the next dialog that asks, in turn; each has to have been asked in the end."""
+    waiting: list[Callable[[Any], None]] = []
+    failed: list[BaseException] = []
+    timer = QTimer(interval=20)
+
+    def look() -> None:
+        dialog = QApplication.activeModalWidget()
+        if dialog is None or not waiting or not dialog.isVisible():
+            return
+        act = waiting.pop(0)
+        try:
+            act(dialog)
+        except BaseException as error:
+            failed.append(error)
+            dialog.close()
+
+    timer.timeout.connect(look)
+    timer.start()
+    yield waiting.append
+    timer.stop()
+    if failed:
+        raise failed[0]
+    assert not waiting, f"{len(waiting)} dialogs did not ask"
+
+
+@pytest.fixture
+def open_window(qapp: QApplication, tmp_path: Path) -> Iterator[Callable[..., MainWindow]]:
+    """Opens a window of the same user, which asks by its own dialogs if it is ``real``; all are closed in the end."""
     windows: list[MainWindow] = []
 
-    def make() -> MainWindow:
+    def make(real: bool = False) -> MainWindow:
         home = Home(tmp_path / "home" / "config", tmp_path / "home" / "data")
-        window = MainWindow(Workbench(home), lambda own: Answers(own, tmp_path))
+        window = MainWindow(Workbench(home), None if real else lambda own: Answers(own, tmp_path))
         window.said: list[Said] = []  # type: ignore[attr-defined,misc]
         window.bench.said.connect(window.said.append)  # type: ignore[attr-defined]
         window.show()
