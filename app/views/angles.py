@@ -10,6 +10,7 @@ import numpy as np
 
 from app.views.colours import RGB
 from solver.angles import JointAngles, conventions, evidence
+from solver.body.skeleton import JOINTS
 from widgets import palette
 
 Side = Literal["left", "right", ""]
@@ -21,6 +22,12 @@ _LONG = {
     "pro": "pronation",
     "sup": "supination",
 }
+_JOINTS = {
+    "pelvis": "pelvis", "spine1": "trunk", "spine2": "trunk", "spine3": "trunk", "hip": "hip", "knee": "knee",
+    "ankle": "ankle", "foot": "ankle", "collar": "shoulder", "shoulder": "shoulder", "elbow": "elbow",
+    "wrist": "wrist", "hand": "wrist",
+}  # fmt: skip
+"""The joint of the conventions that each of the body's joints belongs to."""
 _COLOURS: dict[Side, RGB] = {"left": palette.LEFT, "right": palette.RIGHT, "": (90, 90, 95)}
 
 
@@ -110,6 +117,19 @@ def angles_picture(
             if curves:
                 plots.append(AnglePlot(joint, title_of(pattern), curves))
     return AnglesPicture(angles.time, tuple(plots), angles.title, angles.zero_pose)
+
+
+def joint_of(bone: int | None) -> str | None:
+    """The joint, as the conventions call it, that a bone turns about; None for a bone whose joint they leave out."""
+    if bone is None or not 0 <= bone < len(JOINTS):
+        return None
+    name = JOINTS[bone].removeprefix("left_").removeprefix("right_")
+    return _JOINTS.get(name)
+
+
+def bones_of(joint: str) -> list[int]:
+    """The bones, of both sides, that turn about a joint."""
+    return [bone for bone in range(len(JOINTS)) if joint_of(bone) == joint]
 
 
 def title_of(pattern: str) -> str:

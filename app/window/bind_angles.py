@@ -1,47 +1,110 @@
-"""The joint angles as curves."""
+"""The joint angles as curves, beside those of the results that are compared."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from app.actions import Actions
+from app.actions.run_actions import run_stage
+from app.models import edits
+from app.models.results import Ref
 from app.models.workbench import Workbench
-from app.views.angles import angles_picture
+from app.views.angles import angles_picture, bones_of, conventions, joint_of
 from app.window.shown import Shown
 from widgets.plots.curves import CurvesView
 
 
 class AnglesBinder:
-    """Fills the plots; they follow the clock and the timelines' view."""
+    """Fills the plots; they follow the clock and the selection."""
 
-    def __init__(self, widget: CurvesView, bench: Workbench, shown: Shown) -> None:
+    def __init__(self, widget: CurvesView, bench: Workbench, shown: Shown, table: Actions) -> None:
         self.widget, self.bench, self.shown = widget, bench, shown
         shown.changed.connect(self._changed)
         bench.opened.connect(self._opened)
+        bench.document.changed.connect(lambda another: self._conventions())
         bench.clock.moved.connect(widget.set_time)
+        bench.selection.changed.connect(self._select)
         widget.seeked.connect(bench.clock.seek)
+        widget.joint_chosen.connect(self._joint)
+        widget.convention_chosen.connect(self._convention)
+        widget.export_wanted.connect(lambda: table.trigger("export.angles"))
 
     def _opened(self) -> None:
         if not self.bench.document.is_open:
+            self.widget.set_conventions((), "")
             self.widget.set_curves(np.zeros(0), ())
-        self._restored = False
 
     def _changed(self, stages: frozenset[str]) -> None:
         if not stages & {"angles", "fit", "compared"}:
             return
         angles, motion = self.shown.get("angles"), self.shown.get("fit")
+        self._conventions()
         if angles is None:
             self.widget.set_curves(np.zeros(0), ())
             return
-        others = list(self.shown.compared("angles").values())
         bones = motion.marker_joint if motion is not None and not self.shown.stale("fit") else None
-        reference = others[0] if others else None
+        reference, said = self._reference(angles.convention)
         picture = self.shown.once(
             "angle curves", (angles, bones, reference), lambda: angles_picture(angles, bones, reference)
         )
         before = self.widget.shown()
-        self.widget.set_curves(picture.time, picture.plots, picture.convention, picture.zero_pose)
+        self.widget.set_curves(picture.time, picture.plots, picture.convention, picture.zero_pose, said)
         known = self.bench.document.view.get("angles")
         titles = {plot.title for plot in picture.plots}
         if not before and isinstance(known, list) and titles & set(known):
             self.widget.set_shown([title for title in known if title in titles])
         self.widget.set_time(self.bench.clock.time)
+        self._select(frozenset({"bone"}))
+
+    def _reference(self, convention: str) -> tuple[Any, str]:
+        """The angles that are compared, and what they are of: their own, or those of a fit that is compared."""
+        for ref, angles in self.shown.compared("angles").items():
+            return angles, self._said("angles", ref.key)
+        board = self.bench.board
+        for ref in self.shown.compared("fit"):
+            for entry in board.results.entries("angles"):
+                same = entry.about.get("settings", {}).get("convention") == convention
+                if not same or entry.about.get("inputs", {}).get("fit") != ref.key:
+                    continue
+                if board.results.is_loaded("angles", entry.key):
+                    return board.results.get("angles", entry.key), self._said("fit", ref.key)
+                board.results.loaded.connect(self._loaded)
+                board.results.load_ahead("angles", entry.key)
+        return None, ""
+
+    def _said(self, stage: str, key: str) -> str:
+        row = next((row for row in self.bench.board.card(stage).earlier if row.key == key), None)
+        return "" if row is None else row.settings or f"of {row.when}"
+
+    def _loaded(self, ref: Ref) -> None:
+        if ref.stage == "angles":
+            self._changed(frozenset({"compared"}))
+
+    def _conventions(self) -> None:
+        board = self.bench.board
+        settings = board.settings.get("angles") if self.bench.document.is_open else None
+        if settings is not None:
+            self.widget.set_conventions(
+                [(name, own["title"]) for name, own in conventions().items()], settings.convention
+            )
+
+    def _convention(self, name: str) -> None:
+        """Tell the angles by another convention at once, where there is a fit to tell them of."""
+        bench = self.bench
+        if not bench.apply(edits.set_value(bench.document.session, "angles", "convention", name)):
+            self._conventions()
+        elif "fit" in bench.board.current and "angles" not in bench.board.current and not bench.runner.running:
+            bench.attempt(lambda: run_stage(bench, "angles"))
+
+    def _select(self, what: frozenset[str]) -> None:
+        if "bone" in what:
+            self.widget.set_joint(joint_of(self.bench.selection.bone))
+
+    def _joint(self, joint: str) -> None:
+        """Select the markers on the bones that turn about a joint."""
+        motion = self.shown.fit
+        if motion is not None:
+            self.bench.selection.select_markers(np.flatnonzero(np.isin(motion.marker_joint, bones_of(joint))))
+            self.widget.set_joint(joint)

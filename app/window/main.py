@@ -149,7 +149,7 @@ class MainWindow(QMainWindow):
             HypothesesBinder(self.hypotheses, bench, shown, ghosts, self.scene),
             ConvergenceBinder(self.convergence, bench, shown, ghosts),
             MarkersBinder(self.markers, bench, shown),
-            AnglesBinder(self.angles, bench, shown),
+            AnglesBinder(self.angles, bench, shown, self.table),
             HistoryBinder(self.history, bench),
             WelcomeBinder(self.welcome, bench, self.table, self.open_path, self.drop),
         ]

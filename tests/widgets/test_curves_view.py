@@ -92,7 +92,9 @@ def test_curves_pass_through_their_degrees_and_stop_at_gaps(curves: CurvesView) 
     for time in (0.5, 1.5):
         column = distance(picture[round(area.top()) : round(area.bottom()), round(x.at(time))], palette.LEFT)
         expected = area.height() * (high + room - (20 + 10 * time)) / (high - low + 2 * room)
-        assert abs(int(column.argmin()) - expected) <= 2, time
+        middle = round(expected)
+        assert column[middle - 2 : middle + 3].min() < 60, time  # elsewhere a dash of the reference may stand
+        assert column[middle + 6 :].min() > 60 or expected > area.height() - 8, time
         right = distance(picture[round(area.top()) : round(area.bottom()), round(x.at(time))], palette.RIGHT)
         assert right.min() > 60, "the right knee is lost there"
     column = distance(picture[round(area.top()) : round(area.bottom()), round(x.at(3.0))], palette.RIGHT)
@@ -250,3 +252,32 @@ def test_readouts_say_frame_and_time_of_both_streams(qapp: QApplication) -> None
     assert made.video.text() == "Video none now"
     made.set_readouts(Readout(5999, 6000, 59.99), Readout(None, 0))
     assert made.video.text() == "Video –"
+
+
+def test_the_convention_and_the_joint_of_a_bone_are_shown(curves: CurvesView, qapp: QApplication) -> None:
+    asked: list[str] = []
+    joints: list[str] = []
+    curves.convention_chosen.connect(asked.append)
+    curves.joint_chosen.connect(joints.append)
+    assert not curves.convention.isVisible(), "nothing to choose from"
+    curves.set_conventions((("opensim", "OpenSim"), ("isb", "ISB")), "isb")
+    assert curves.convention.currentData() == "isb" and asked == []
+    curves.convention.setFocus()
+    QTest.keyClick(curves.convention, Qt.Key.Key_Up)
+    curves.convention.activated.emit(0)
+    assert asked[-1] == "opensim"
+    qapp.processEvents()
+    curves.set_shown(["Knee", "Hip flexion"])
+    qapp.processEvents()
+    before = pixels(curves.plots)
+    curves.set_joint("knee")
+    framed = (distance(pixels(curves.plots), palette.SELECTED) < 40) & (distance(before, palette.SELECTED) > 60)
+    rows, columns = np.flatnonzero(framed.any(axis=1)), np.flatnonzero(framed.any(axis=0))
+    area = next(a for p, a in zip(curves.plots._plots, curves.plots.areas()) if p.joint == "knee")
+    found, wanted = (columns[0], columns[-1], rows[0], rows[-1]), (area.left(), area.right(), area.top(), area.bottom())
+    assert np.allclose(found, wanted, atol=3), (found, wanted)
+    assert joints == [], "what is selected elsewhere is only shown"
+    curves.set_joint(None)
+    assert np.array_equal(pixels(curves.plots), before)
+    curves.tree.itemClicked.emit(curves.tree.topLevelItem(1), 0)
+    assert joints == ["knee"]

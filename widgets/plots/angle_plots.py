@@ -38,7 +38,14 @@ class AnglePlots(QWidget):
         self._plots: tuple[Any, ...] = ()
         self._view = (0.0, 1.0)
         self._cursor = 0.0
+        self._joint: str | None = None
         self._picture: QPixmap | None = None
+
+    def set_joint(self, joint: str | None) -> None:
+        """Frame the plots of a joint, None for none."""
+        if joint != self._joint:
+            self._joint = joint
+            self.update()
 
     def set_plots(self, time: np.ndarray, plots: Sequence[Any], view: tuple[float, float]) -> None:
         """Show these, see :class:`AnglePlot`, over the part ``view`` of the clock, s."""
@@ -122,6 +129,10 @@ class AnglePlots(QWidget):
         painter.drawPixmap(0, 0, self._picture)
         metrics = QFontMetricsF(self.font())
         for k, (plot, area) in enumerate(zip(self._plots, self.areas())):
+            if plot.joint == self._joint:
+                painter.setBrush(Qt.BrushStyle.NoBrush)
+                painter.setPen(pen(palette.SELECTED, 2))
+                painter.drawRect(area)
             x = self.scale(area).at(self._cursor)
             if area.left() <= x <= area.right():
                 painter.setPen(pen(palette.SELECTED, 1.5))

@@ -9,19 +9,24 @@ import numpy as np
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QPainter, QPalette
 from PySide6.QtWidgets import (
+    QComboBox,
     QFrame,
+    QHBoxLayout,
     QLabel,
     QScrollArea,
     QSplitter,
     QStyle,
     QStyledItemDelegate,
     QStyleOptionViewItem,
+    QToolButton,
     QTreeWidget,
     QTreeWidgetItem,
     QVBoxLayout,
     QWidget,
 )
 
+from widgets.icons import icon
+from widgets.panels.controls import ChoiceBox
 from widgets.plots.angle_plots import AnglePlots
 from widgets.plots.ink import pen
 from widgets.theme import colours
@@ -55,10 +60,16 @@ class CurvesView(QWidget):
     -------
     seeked(time) : s
     shown_changed(titles) : the user ticked others
+    joint_chosen(joint) : the name of a joint was clicked
+    convention_chosen(name) : angles are to be told by another convention
+    export_wanted()
     """
 
     seeked = Signal(float)
     shown_changed = Signal(list)
+    joint_chosen = Signal(str)
+    convention_chosen = Signal(str)
+    export_wanted = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -71,6 +82,23 @@ class CurvesView(QWidget):
         self.tree.setItemDelegate(BoxDelegate(self.tree))
         self.tree.setAccessibleName("Angles to show")
         self.tree.itemChanged.connect(self._ticked)
+        self.tree.itemClicked.connect(self._clicked)
+        self.tree.itemActivated.connect(self._clicked)
+        self.convention = ChoiceBox()
+        self.convention.setAccessibleName("Convention of the angles")
+        self.convention.setToolTip("By which convention the angles are told: their names, sequences and signs")
+        self.convention.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.convention.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.convention.setMinimumContentsLength(18)
+        self.convention.activated.connect(lambda k: self.convention_chosen.emit(self.convention.itemData(k)))
+        self.export = QToolButton()
+        self.export.setIcon(icon("export"))
+        self.export.setAutoRaise(True)
+        self.export.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.export.setAccessibleName("Export angles")
+        self.export.setToolTip("Write the angles as CSV, in degrees")
+        self.export.clicked.connect(lambda: self.export_wanted.emit())
+        self.set_conventions((), "")
         self.plots = AnglePlots()
         self.plots.seeked.connect(self.seeked)
         self._title = QLabel()
@@ -84,7 +112,12 @@ class CurvesView(QWidget):
         right = QWidget()
         column = QVBoxLayout(right)
         column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self._title)
+        head = QHBoxLayout()
+        head.setContentsMargins(4, 2, 4, 0)
+        head.addWidget(self.convention)
+        head.addWidget(self.export)
+        head.addWidget(self._title, 1)
+        column.addLayout(head)
         column.addWidget(scroll, 1)
         split = QSplitter(Qt.Orientation.Horizontal)
         split.addWidget(self.tree)
@@ -113,11 +146,36 @@ class CurvesView(QWidget):
         zero = f" Counted from {zero_pose[:1].lower()}{zero_pose[1:].rstrip('.')}." if zero_pose else ""
         dashed = any(curve.reference is not None for plot in plots for curve in plot.curves)
         against = f" Dashed: {reference or 'compared with'}." if dashed else ""
-        self._title.setText(f"{convention}, degrees.{against}" if plots else "")
+        told = "Degrees." if self.convention.count() else f"{convention}, degrees."
+        self._title.setText(f"{told}{against}" if plots else "")
         self._title.setToolTip(f"{convention}, degrees.{zero}" if plots else "")
         if not again:
             self._fill()
         self._show()
+
+    def set_conventions(self, choices: Sequence[tuple[str, str]], current: str) -> None:
+        """Offer conventions, each a name and a title, one of them in force; nothing is emitted."""
+        with QSignalBlocker(self.convention):
+            self.convention.clear()
+            for name, title in choices:
+                self.convention.addItem(title, name)
+                self.convention.setItemData(self.convention.count() - 1, title, Qt.ItemDataRole.ToolTipRole)
+            self.convention.setCurrentIndex(self.convention.findData(current))
+        for part in (self.convention, self.export):
+            part.setVisible(bool(choices))
+
+    def set_joint(self, joint: str | None) -> None:
+        """Point at the joint of what is selected elsewhere, None for none; nothing is emitted."""
+        self.plots.set_joint(joint)
+        with QSignalBlocker(self.tree):
+            groups = [self.tree.topLevelItem(k) for k in range(self.tree.topLevelItemCount())]
+            found = next((g for g in groups if g is not None and g.data(0, Qt.ItemDataRole.UserRole) == joint), None)
+            if found is not None:
+                self.tree.setCurrentItem(found)
+                found.setExpanded(True)
+                self.tree.scrollToItem(found)
+            else:
+                self.tree.setCurrentIndex(QModelIndex())
 
     def set_shown(self, titles: Iterable[str]) -> None:
         """Tick these and no others; nothing is emitted."""
@@ -153,6 +211,8 @@ class CurvesView(QWidget):
             first = [joint for joint in joints if joint in FIRST] or joints[:3]
             for joint in joints:
                 group = QTreeWidgetItem(self.tree, [joint.replace("_", " ").capitalize()])
+                group.setData(0, Qt.ItemDataRole.UserRole, joint)
+                group.setToolTip(0, "A click selects the markers on the bones that turn about it")
                 group.setFlags(group.flags() | Qt.ItemFlag.ItemIsAutoTristate | Qt.ItemFlag.ItemIsUserCheckable)
                 for k, plot in enumerate(plot for plot in self._all if plot.joint == joint):
                     item = QTreeWidgetItem(group, [plot.title])
@@ -168,6 +228,10 @@ class CurvesView(QWidget):
         groups = [self.tree.topLevelItem(k) for k in range(self.tree.topLevelItemCount())]
         found = [group.child(k) for group in groups if group is not None for k in range(group.childCount())]
         return [item for item in found if item is not None]
+
+    def _clicked(self, item: QTreeWidgetItem) -> None:
+        group = item.parent() or item
+        self.joint_chosen.emit(group.data(0, Qt.ItemDataRole.UserRole))
 
     def _ticked(self, item: QTreeWidgetItem) -> None:
         if item.childCount() == 0:

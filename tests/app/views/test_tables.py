@@ -13,10 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from app.views.angles import angles_picture, title_of
+from app.views.angles import angles_picture, bones_of, joint_of, title_of
 from app.views.markers import gap_lengths, marker_table
 from app.views.tracks import MEASURED, tracks_of
 from solver.angles import AngleSettings, Convention, JointAngles, conventions, evidence, joint_angles
+from solver.body.skeleton import JOINTS
 from solver.segment import segment
 from tests.app.views.conftest import Made
 
@@ -146,3 +147,11 @@ def test_the_angles_of_a_real_solve_have_their_words(results: Mapping[str, Any])
     shown = angles_picture(results["angles"], results["fit"].marker_joint)
     assert shown.convention.startswith("OpenSim") and "stance" in shown.zero_pose
     assert {curve.rests_on for plot in shown.plots for curve in plot.curves} <= {"markers", "one segment", "video only"}
+
+
+def test_bones_and_the_joints_of_the_conventions() -> None:
+    names = {JOINTS[bone]: joint_of(bone) for bone in range(len(JOINTS))}
+    assert names["left_knee"] == names["right_knee"] == "knee" and names["head"] is None and joint_of(None) is None
+    assert {JOINTS[bone] for bone in bones_of("elbow")} == {"left_elbow", "right_elbow"}
+    known = {joint for own in conventions().values() for joint in own["joints"]}
+    assert {joint for joint in names.values() if joint} == known, "every joint of every convention has bones"
