@@ -94,10 +94,9 @@ class Layout:
         return Layout(tuple(self.labels[i] for i in index), vertex, joint, offset, normal, columns, self.body)
 
     def plain(self) -> dict[str, Any]:
-        """As JSON has it, to the hundredth of a millimetre."""
-        whole = {name: getattr(self, name).tolist() for name in ("vertex", "joint", "columns")}
-        broken = {name: np.round(getattr(self, name), 5).tolist() for name in ("offset", "normal")}
-        return {"labels": list(self.labels), **whole, **broken, "body": self.body}
+        """As JSON has it."""
+        arrays = {name: getattr(self, name).tolist() for name in ("vertex", "joint", "columns", "offset", "normal")}
+        return {"labels": list(self.labels), **arrays, "body": self.body}
 
     @classmethod
     def from_plain(cls, said: Mapping[str, Any]) -> Layout:
