@@ -10,6 +10,8 @@ _TRIALS = 150
 """Places at which a gap of the same length is tried, at most."""
 _INSIDE = (0.25, 0.5, 0.75)
 """Where in such a gap its error is looked at."""
+_TRUST_IN_ENDS, _LIKENESS = 0.25, (1 / 16, 16.0)
+"""The error rises with this power of how much more than usual the ends of a gap differ, between these limits."""
 
 
 def throughout(there: np.ndarray, gap: Gap) -> np.ndarray:
@@ -33,31 +35,46 @@ def blend(gap: Gap, ends: np.ndarray, residual: np.ndarray) -> np.ndarray:
     return (1 - share) * residual[0] + share * residual[1]
 
 
-def drift(frames: np.ndarray, residual: np.ndarray, gap: Gap, ends: int) -> float:
+def drift(frames: np.ndarray, residual: np.ndarray, gap: Gap, ends: np.ndarray) -> float:
     """Mean error, m, that blending leaves in gaps of this length, tried out where the residual is known.
+
+    More than that where the two ends of this gap differ more than elsewhere, less where they agree.
 
     Parameters
     ----------
     frames : (N,) frames in which it is known, rising
     residual : (N, 3) m, zero where the method is right
-    ends : how many ends of the gap are seen
+    ends : the frames beside the gap that are seen, as ``ends_of`` has them
     """
     if len(frames) < 2:
         return np.inf
-    if ends == 0:
+    if len(ends) == 0:
         return float(np.linalg.norm(residual - residual.mean(axis=0), axis=1).mean())
     length, times = gap.length, 1
     while length >= 1:
-        error = _tried(frames, residual, length + (ends == 2), (gap.first + gap.last) / 2, ends)
-        if error is not None:
-            return times * error
+        tried = _tried(frames, residual, length + (len(ends) == 2), (gap.first + gap.last) / 2, len(ends))
+        if tried is not None:
+            error, step = tried
+            return times * error * _unlike(frames, residual, ends, times * step)
         # Never seen for as long as that: what half the length leaves, and as much again.
         length, times = length // 2, times * 2
     return np.inf
 
 
-def _tried(frames: np.ndarray, residual: np.ndarray, lag: int, near: float, ends: int) -> float | None:
-    """Mean error of blending over ``lag`` frames, at the places nearest to ``near``; None where none is known."""
+def _unlike(frames: np.ndarray, residual: np.ndarray, ends: np.ndarray, usual: float) -> float:
+    """By how much more than usual the residual is to be expected to move within a gap, from how it differs beyond."""
+    rows = np.searchsorted(frames, ends)
+    if len(ends) < 2 or rows[1] >= len(frames) or (frames[rows] != ends).any() or usual <= 0:
+        return 1.0
+    times = float(np.linalg.norm(residual[rows[1]] - residual[rows[0]])) / usual
+    return float(np.clip(times, *_LIKENESS)) ** _TRUST_IN_ENDS
+
+
+def _tried(frames: np.ndarray, residual: np.ndarray, lag: int, near: float, ends: int) -> tuple[float, float] | None:
+    """Mean error of blending over ``lag`` frames, and mean way from end to end, at the places nearest to ``near``.
+
+    None where none is known.
+    """
     starts = frames[frames + lag <= frames[-1]]
     if len(starts) > 4 * _TRIALS:
         starts = starts[np.argsort(np.abs(starts + lag / 2 - near), kind="stable")[: 4 * _TRIALS : 4]]
@@ -65,18 +82,24 @@ def _tried(frames: np.ndarray, residual: np.ndarray, lag: int, near: float, ends
         starts = starts[:: len(starts) // _TRIALS]
     if len(starts) == 0:
         return None
-    times = starts[:, None] + lag * np.array([0.0, *_INSIDE, 1.0])
+    # Whole frames: between two of them a line would be taken for the truth.
+    inside = np.unique(np.clip(np.round(lag * np.array(_INSIDE)), 1, max(1, lag - (ends == 2))))
+    times = starts[:, None] + np.array([0.0, *inside, lag])
     after = np.clip(np.searchsorted(frames, times), 1, len(frames) - 1)
     left, right = frames[after - 1], frames[after]
-    # Between two known frames further apart than usual there is a gap, about which nothing can be tried.
-    whole = (right - left <= max(2 * np.median(np.diff(frames)), 1 + lag // 8)).all(axis=1)
+    # Where frames are further apart there is a gap, about which nothing can be tried; for a short lag all have to be
+    # known, if somewhere they are.
+    apart = (right - left).max(axis=1)
+    whole = apart <= max(1, lag // 4)
+    if not whole.any():
+        whole = apart <= max(2 * np.median(np.diff(frames)), 1 + lag // 8)
     if not whole.any():
         return None
     share = ((times - left) / (right - left))[whole, :, None]
     value = (1 - share) * residual[after[whole] - 1] + share * residual[after[whole]]
     first, last = value[:, 0], value[:, -1]
     errors = [
-        np.linalg.norm(value[:, k] - ((1 - f) * first + f * last if ends == 2 else first), axis=1)
-        for k, f in enumerate(_INSIDE, start=1)
+        np.linalg.norm(value[:, k] - ((1 - f / lag) * first + f / lag * last if ends == 2 else first), axis=1)
+        for k, f in enumerate(inside, start=1)
     ]
-    return float(np.mean(errors))
+    return float(np.mean(errors)), float(np.linalg.norm(last - first, axis=1).mean())

@@ -29,9 +29,7 @@ def fill_by_body(placed: np.ndarray) -> FillMethod:
             off = positions[:, m] - placed[:, m]
             ends, frames = ends_of(gap, both), np.flatnonzero(both)
             values = placed[span, m] + blend(gap, ends, off[ends])
-            parts.append(
-                (Fill(m, gap.first, gap.last, "body", 0.0, drift(frames, off[frames], gap, len(ends))), values)
-            )
+            parts.append((Fill(m, gap.first, gap.last, "body", 0.0, drift(frames, off[frames], gap, ends)), values))
         return together(positions, parts, settings)
 
     return fill

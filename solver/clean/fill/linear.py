@@ -17,6 +17,6 @@ def fill_linear(positions: np.ndarray, rate: float, settings: FillSettings) -> F
         if len(ends) < 2:
             continue
         track, seen = positions[:, gap.marker], np.flatnonzero(present[:, gap.marker])
-        error = drift(seen, track[seen], gap, 2)
+        error = drift(seen, track[seen], gap, ends)
         parts.append((Fill(gap.marker, gap.first, gap.last, "linear", 0.0, error), blend(gap, ends, track[ends])))
     return together(positions, parts, settings)

@@ -24,6 +24,6 @@ def fill_pattern(positions: np.ndarray, rate: float, settings: FillSettings) -> 
         apart = positions[:, gap.marker] - positions[:, donor[0]]
         both = np.flatnonzero(present[:, gap.marker] & present[:, donor[0]])
         values = positions[span, donor[0]] + blend(gap, ends, apart[ends])
-        error = drift(both, apart[both], gap, len(ends))
+        error = drift(both, apart[both], gap, ends)
         parts.append((Fill(gap.marker, gap.first, gap.last, "pattern", 0.0, error), values))
     return together(positions, parts, settings)

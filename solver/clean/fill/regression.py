@@ -26,6 +26,8 @@ _FILLED_M = 0.01
 _FILLED_WEIGHT = 0.3
 """Weight of a frame for the regression if all neighbours are filled in it."""
 _FOLDS = 4
+_ABOUT = 30
+"""Frames on either side of a gap that tell how well the method does there, all of them, learnt from or not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,8 @@ class _Local:
     R_lab_local, centre : (N, 3, 3) and (N, 3) m, the frame
     features : (N, 3K) m, the neighbours in it
     target : (N, 3) m, the marker in it
-    train : rows from which the relation is learnt
+    seen : rows in which it was measured
+    train : rows of these from which the relation is learnt
     weight : of these, sums to 1
     """
 
@@ -65,6 +68,7 @@ class _Local:
     centre: np.ndarray
     features: np.ndarray
     target: np.ndarray
+    seen: np.ndarray
     train: np.ndarray
     weight: np.ndarray
 
@@ -122,7 +126,7 @@ def _local(scene: _Scene, marker: int, group: np.ndarray, gaps: list[Gap]) -> _L
     needed = np.zeros(len(complete), dtype=bool)
     needed[train] = True
     for gap in gaps:
-        needed[max(gap.first - 1, 0) : gap.last + 2] = True
+        needed[max(gap.first - _ABOUT, 0) : gap.last + 1 + _ABOUT] = True
     frames = np.flatnonzero(needed & complete)
     rows = np.searchsorted(frames, train)
     points, seen = scene.positions[frames][:, group], scene.present[frames][:, group]
@@ -132,7 +136,8 @@ def _local(scene: _Scene, marker: int, group: np.ndarray, gaps: list[Gap]) -> _L
     features = ((points - centre[:, None]) @ R_lab_local).reshape(len(frames), -1)
     target = np.einsum("nji,nj->ni", R_lab_local, scene.positions[frames, marker] - centre)
     weight = _FILLED_WEIGHT + (1 - _FILLED_WEIGHT) * seen[rows].mean(axis=1) ** 2
-    return _Local(group, frames, R_lab_local, centre, features, target, rows, weight / weight.sum())
+    measured = np.flatnonzero(scene.present[frames, marker])
+    return _Local(group, frames, R_lab_local, centre, features, target, measured, rows, weight / weight.sum())
 
 
 def _predicted(scene: _Scene, local: _Local, marker: int, gaps: list[Gap]) -> Parts:
@@ -142,7 +147,8 @@ def _predicted(scene: _Scene, local: _Local, marker: int, gaps: list[Gap]) -> Pa
     X, Y = X - mean_x, Y - mean_y
     weighted = X * local.weight[:, None]
     gram, cross = weighted.T @ X, weighted.T @ Y
-    residual = _held_out(X, Y, local.weight, gram, cross)
+    tried = local.features[local.seen] - mean_x, local.target[local.seen] - mean_y
+    residual = _held_out(X, Y, local.weight, gram, cross, tried, np.searchsorted(local.seen, local.train))
     found: Parts = {}
     for gap in gaps:
         span = np.arange(gap.first, gap.last + 1)
@@ -157,7 +163,7 @@ def _predicted(scene: _Scene, local: _Local, marker: int, gaps: list[Gap]) -> Pa
         guess = around @ slope + mean_y
         inside = guess[: len(span)] + blend(gap, ends, local.target[at_ends] - guess[len(span) :])
         values = np.einsum("nij,nj->ni", local.R_lab_local[rows], inside) + local.centre[rows]
-        error = drift(local.frames[local.train], residual, gap, len(ends)) * (1 + float(lost.mean()))
+        error = drift(local.frames[local.seen], residual, gap, ends) * (1 + float(lost.mean()))
         error *= _beyond(around[: len(span)], inverse, gram)
         found[gap] = Fill(marker, gap.first, gap.last, "regression", 0.0, error), values
     return found
@@ -170,12 +176,30 @@ def _beyond(features: np.ndarray, inverse: np.ndarray, gram: np.ndarray) -> floa
     return float(np.sqrt(max(1.0, leverage.mean() / max(usual, 1e-12))))
 
 
-def _held_out(X: np.ndarray, Y: np.ndarray, weight: np.ndarray, gram: np.ndarray, cross: np.ndarray) -> np.ndarray:
-    """(N, 3) m, what is left of each row by the regression on the other folds; folds are spans of time."""
-    left = np.empty_like(Y)
-    for fold in np.array_split(np.arange(len(X)), _FOLDS):
+def _held_out(
+    X: np.ndarray,
+    Y: np.ndarray,
+    weight: np.ndarray,
+    gram: np.ndarray,
+    cross: np.ndarray,
+    tried: tuple[np.ndarray, np.ndarray],
+    train: np.ndarray,
+) -> np.ndarray:
+    """(S, 3) m, what is left of each tried row by the regression on the folds it is not in; folds are spans of time.
+
+    Parameters
+    ----------
+    X, Y, weight : what is learnt from, and gram, cross of it
+    tried : features and target of S rows, those learnt from among them
+    train : which of the S those are
+    """
+    left = np.empty_like(tried[1])
+    folds = np.array_split(np.arange(len(X)), _FOLDS)
+    starts = [0, *(train[fold[0]] for fold in folds[1:]), len(left)]
+    for k, fold in enumerate(folds):
         weighted = X[fold] * weight[fold, None]
         ridge = _NOISE_M**2 * (1 - weight[fold].sum()) * np.eye(len(gram))
         slope = np.linalg.solve(gram - weighted.T @ X[fold] + ridge, cross - weighted.T @ Y[fold])
-        left[fold] = Y[fold] - X[fold] @ slope
+        span = slice(starts[k], starts[k + 1])
+        left[span] = tried[1][span] - tried[0][span] @ slope
     return left

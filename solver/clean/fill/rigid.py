@@ -53,5 +53,5 @@ def rigid_part(
     ends = ends_of(gap, both)
     inside = local.mean(axis=0) + blend(gap, ends, residual[np.searchsorted(known, ends)])
     values = np.einsum("nij,nj->ni", R_lab_local[len(known) :], inside) + centre[len(known) :]
-    error = drift(known, residual, gap, len(ends))
+    error = drift(known, residual, gap, ends)
     return Fill(gap.marker, gap.first, gap.last, "rigid", 0.0, error), values
