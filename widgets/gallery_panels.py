@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QWidget
 
 from widgets import palette
 from widgets.panels.hypotheses import HypothesesView, Hypothesis, Term
+from widgets.panels.scene_bar import Choice, SceneBar
 from widgets.panels.stage_data import EarlierResult, FieldSpec, StageData, StageProgress
 from widgets.panels.stage_panel import StagePanel
 from widgets.panels.transport import Readout, Transport
@@ -96,4 +97,17 @@ def transport() -> QWidget:
     return made
 
 
-EXAMPLES = {"stages": stages, "hypotheses": hypotheses, "transport": transport}
+def scene_bar() -> QWidget:
+    """Colours by bone, trails on."""
+    made = SceneBar(
+        [Choice("cluster", "Group", "1", "Who moves together"), Choice("bone", "Bone", "2", "What they sit on")],
+        [Choice("body", "Body", "B", "The fitted skin"), Choice("trails", "Trails", "T", "Where the markers were")],
+        [Choice("front", "From the front", "Ctrl+1", "Look from the front")],
+        {"tool": "Q", "follow": "J", "opacity": "O, Shift+O", "trail": "Ctrl+T, Shift+T"},
+    )
+    made.set_state(True, "bone", ("body", "trails"), 0.6, 0.5, False)
+    made.resize(made.sizeHint())
+    return made
+
+
+EXAMPLES = {"stages": stages, "hypotheses": hypotheses, "transport": transport, "scene_bar": scene_bar}

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QHBoxLayout, QLabel, QMenu, QSlider, QToolButton, QWidget
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QHBoxLayout, QLabel, QSlider, QToolButton, QWidget
 
 from widgets.icons import icon
+from widgets.panels.menu_button import menu_button
 
 
 @dataclass(frozen=True)
@@ -64,9 +65,9 @@ class SceneBar(QWidget):
         listed = ", ".join(f"{choice.title} {choice.keys}" for choice in colours if choice.keys)
         self.colour.setToolTip(f"What the colours of the markers mean ({listed})")
         self.colour.activated.connect(lambda k: self.colour_chosen.emit(self.colour.itemData(k)))
-        self.layers = _menu_button("Layers", "What is shown in the scene and in the video", "show")
+        self.layers = menu_button("Layers", "What is shown in the scene and in the video")
         self.actions_of_layers = {choice.name: self._layer(choice) for choice in layers}
-        self.views = _menu_button("View", "From where one looks at the scene", "camera")
+        self.views = menu_button("View", "From where one looks at the scene")
         self.actions_of_views = {choice.name: self._view(choice) for choice in views}
         self.follow = _button("target", "Follow the person", f"The camera goes along{_said(keys.get('follow'))}")
         self.follow.setCheckable(True)
@@ -143,17 +144,6 @@ def _button(glyph: str, name: str, tip: str) -> QToolButton:
     button.setAccessibleName(name)
     button.setToolTip(tip)
     button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-    return button
-
-
-def _menu_button(title: str, tip: str, glyph: str) -> QToolButton:
-    button = _button(glyph, title, tip)
-    button.setText(title)
-    button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
-    button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-    menu = QMenu(button)
-    menu.setToolTipsVisible(True)
-    button.setMenu(menu)
     return button
 
 

@@ -21,15 +21,13 @@ from PySide6.QtWidgets import QMenu, QToolTip, QWidget
 
 from widgets import palette
 from widgets.plots import affinity_paint as paint
+from widgets.plots.affinity_below import Below
 from widgets.plots.affinity_menu import edit_menu
 from widgets.plots.affinity_paint import MM, Places
 from widgets.plots.dendrogram import Dendrogram
 from widgets.plots.ink import colour, em, pen, runs
 from widgets.plots.scales import Scale, number
 from widgets.theme import colours
-
-_REACH = 7.0
-"""px from the cut within which it is grabbed."""
 
 
 class AffinityView(QWidget):
@@ -198,51 +196,9 @@ class AffinityView(QWidget):
             painter.setPen(pen(palette.SELECTED, 3))
             painter.drawRect(self.cell(*self._pair).adjusted(-1, -1, 1, 1))
 
-    # what lies below the pointer
-
-    def _column(self, x: float) -> int:
-        area = self.places().matrix
-        return int(np.clip((x - area.left()) / area.width() * len(self._order), 0, len(self._order) - 1))
-
-    def _row(self, y: float) -> int:
-        area = self.places().matrix
-        return int(np.clip((y - area.top()) / area.height() * len(self._order), 0, len(self._order) - 1))
-
-    def _on_cut(self, at: QPointF) -> bool:
-        area = self.places().tree
-        y = min(max(self.height_scale().at(max(self._cut * MM, 1e-9)), area.top()), area.bottom())
-        return abs(at.y() - y) <= _REACH and area.left() - 2 <= at.x() <= area.right() + _REACH
-
-    def _branch_at(self, at: QPointF) -> np.ndarray:
-        """Markers below the lowest bracket whose lines are near a point."""
-        area, scale, brackets = self.places().tree, self.height_scale(), self._tree.brackets
-        x = area.left() + brackets[:, [0, 2]] * area.width() / len(self._order)
-        y = scale.pixel(np.maximum(brackets[:, [1, 3, 4]] * MM, scale.low))
-        flat = (x[:, 0] - 4 <= at.x()) & (at.x() <= x[:, 1] + 4) & (np.abs(y[:, 2] - at.y()) <= 4)
-        left = (np.abs(x[:, 0] - at.x()) <= 4) & (y[:, 2] <= at.y()) & (at.y() <= y[:, 0])
-        right = (np.abs(x[:, 1] - at.x()) <= 4) & (y[:, 2] <= at.y()) & (at.y() <= y[:, 1])
-        found = np.flatnonzero(flat | left | right)
-        if not len(found):
-            return np.zeros(0, np.intp)
-        join = int(found[np.argmin(brackets[found, 4])])
-        first, last = self._tree.spans[len(self._order) + join]
-        return self._order[first:last]
-
-    def _markers_at(self, at: QPointF) -> list[int]:
-        places = self.places()
-        if self._image is None:
-            return []
-        for area, index in ((places.strip, self._column(at.x())), (places.side, self._row(at.y()))):
-            if area.adjusted(-2, -2, 2, 2).contains(at):
-                group = self._clusters[self._order[index]]
-                return np.flatnonzero(self._clusters == group).tolist() if group >= 0 else [int(self._order[index])]
-        if places.labels.contains(at):
-            return [int(self._order[self._row(at.y())])]
-        if places.tree.contains(at):
-            return [int(m) for m in self._branch_at(at)]
-        if places.matrix.contains(at):
-            return sorted({int(self._order[self._row(at.y())]), int(self._order[self._column(at.x())])})
-        return []
+    def below(self) -> Below:
+        """What finds what lies at a point."""
+        return Below(self.places(), self.height_scale(), self._tree, self._order, self._clusters, self._cut)
 
     # what the user does
 
@@ -251,13 +207,14 @@ class AffinityView(QWidget):
         at = event.position()
         if event.button() != Qt.MouseButton.LeftButton or self._image is None:
             return
-        if self._on_cut(at):
+        below = self.below()
+        if below.is_cut(at):
             self._dragging = True
-        elif self.places().matrix.contains(at) and (i := self._row(at.y())) != (j := self._column(at.x())):
-            self.pair_clicked.emit(int(self._order[i]), int(self._order[j]))
-        elif markers := self._markers_at(at):
+        elif (pair := below.pair(at)) is not None and pair[0] != pair[1]:
+            self.pair_clicked.emit(*pair)
+        elif markers := below.markers(at):
             self.leaves_clicked.emit(markers, event.modifiers())
-        elif self.places().tree.contains(at):
+        elif below.places.tree.contains(at):
             self._dragging = True
             self.mouseMoveEvent(event)
 
@@ -269,7 +226,7 @@ class AffinityView(QWidget):
             self.update()
             self.cut_dragged.emit(self._cut)
         else:
-            over = self._image is not None and self._on_cut(event.position())
+            over = self._image is not None and self.below().is_cut(event.position())
             self.setCursor(Qt.CursorShape.SizeVerCursor if over else Qt.CursorShape.ArrowCursor)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
@@ -298,7 +255,7 @@ class AffinityView(QWidget):
         """Offer the edits, for what is selected if the pointer is on it (or the menu key was used)."""
         markers = sorted(self._selected)
         if event.reason() == QContextMenuEvent.Reason.Mouse:
-            below = self._markers_at(QPointF(event.pos()))
+            below = [] if self._image is None else self.below().markers(QPointF(event.pos()))
             markers = markers if set(below) <= self._selected else below
         if markers:
             menu = self.menu_for(markers)
@@ -312,28 +269,7 @@ class AffinityView(QWidget):
     def event(self, event: QEvent) -> bool:
         """Say what lies below the pointer."""
         if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
-            QToolTip.showText(event.globalPos(), self._tip(QPointF(event.pos())), self)
+            text = "" if self._image is None else self.below().tip(QPointF(event.pos()), self._labels, self._matrix)
+            QToolTip.showText(event.globalPos(), text, self)
             return True
         return super().event(event)
-
-    def _tip(self, at: QPointF) -> str:
-        if self._image is None:
-            return ""
-        if self.places().matrix.contains(at):
-            i, j = int(self._order[self._row(at.y())]), int(self._order[self._column(at.x())])
-            if i == j:
-                return f"{self._labels[i]}, {_group(self._clusters[i])}"
-            value = self._matrix[i, j] * MM
-            known = f"{number(value)} mm" if np.isfinite(value) else "never seen together"
-            return f"{self._labels[i]} and {self._labels[j]}: standard deviation of distance {known}"
-        if self._on_cut(at):
-            return "Drag up for fewer groups, down for more: branches that join below the line are one group."
-        markers = self._markers_at(at)
-        if not markers:
-            return "The higher two branches join, the less rigidly their markers move together."
-        names = ", ".join(self._labels[m] for m in markers[:12]) + (" …" if len(markers) > 12 else "")
-        return f"{names} ({_group(self._clusters[markers[0]])})" if len(markers) == 1 else f"{len(markers)}: {names}"
-
-
-def _group(cluster: int) -> str:
-    return f"group {cluster + 1}" if cluster >= 0 else "left out"

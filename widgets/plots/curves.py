@@ -89,7 +89,7 @@ class CurvesView(QWidget):
         self.convention.setToolTip("By which convention the angles are told: their names, sequences and signs")
         self.convention.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.convention.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-        self.convention.setMinimumContentsLength(18)
+        self.convention.setMinimumContentsLength(26)
         self.convention.activated.connect(lambda k: self.convention_chosen.emit(self.convention.itemData(k)))
         self.export = QToolButton()
         self.export.setIcon(icon("export"))

@@ -182,16 +182,18 @@ class CurvePainter:
 
     def __init__(self, row: CurveRow) -> None:
         self.row = row
+        self._names = 0.0
         framed = [curve for curve in row.curves if curve.framed] or row.curves
         self.limits = limits([curve.values for curve in framed], row.lowest)
 
     def height(self, em: float) -> float:
-        """Four lines of text, so that a legend does not hide the curves."""
-        return 4.0 * em
+        """Four lines of text, the first for the names where there are several curves."""
+        self._names = 1.15 * em if len(self.row.curves) > 1 else 0.0
+        return 4.0 * em + 0.5 * self._names
 
     def y_scale(self, area: QRectF) -> Scale:
-        """Values to pixels."""
-        return Scale(*self.limits, area.bottom() - 3, area.top() + 3)
+        """Values to pixels, below the names."""
+        return Scale(*self.limits, area.bottom() - 3, area.top() + 3 + self._names)
 
     def paint(self, painter: QPainter, area: QRectF, x: Scale) -> None:
         """Draw the axis, the lines and their names."""

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, QPointF, QRect, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFontMetricsF, QHelpEvent, QMouseEvent, QPainter, QPaintEvent, QPixmap, QWheelEvent
-from PySide6.QtWidgets import QMenu, QToolButton, QToolTip, QWidget
+from PySide6.QtWidgets import QMenu, QToolTip, QWidget
 
 from widgets import palette
 from widgets.plots.ink import colour, elided, em, pen
-from widgets.plots.row_painters import OffsetPainter, PresencePainter, RowPainter, offset_text, painter_of
+from widgets.plots.row_buttons import RowButtons
+from widgets.plots.row_painters import OffsetPainter, PresencePainter, RowPainter, painter_of
 from widgets.plots.rows import CurveRow, Row
 from widgets.plots.scales import Scale
 from widgets.plots.time_window import TimeWindow
@@ -51,11 +52,7 @@ class TimelineRows(QWidget):
         self._grabbed = ""
         self._from = 0.0
         self._pressed = QPointF()
-        self._menus: dict[str, QToolButton] = {}
-        self._accept = QToolButton(self)
-        self._accept.setAccessibleName("Take the automatic offset")
-        self._accept.clicked.connect(self._take_automatic)
-        self._accept.hide()
+        self._buttons = RowButtons(self, self._take_automatic)
         window.viewed.connect(self._repaint)
         window.moved.connect(self._move_cursor)
         window.ranged.connect(self.update)
@@ -73,15 +70,8 @@ class TimelineRows(QWidget):
 
     def set_row_menu(self, name: str, text: str, tip: str, menu: QMenu) -> None:
         """Offer a menu below the name of a row."""
-        button = self._menus[name] = QToolButton(self)
-        button.setText(text)
-        button.setToolTip(tip)
-        button.setAccessibleName(f"{name}: {text}")
-        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        button.setMenu(menu)
-        button.hide()
-        self._place_button()
+        self._buttons.add_menu(name, text, tip, menu)
+        self._place_buttons()
 
     def set_selected(self, markers: frozenset[int]) -> None:
         """Frame their strips."""
@@ -99,7 +89,7 @@ class TimelineRows(QWidget):
         found = self._offset_painter()
         if found is not None and found.offset != offset:
             found.offset = offset
-            self._place_button()
+            self._place_buttons()
             self._repaint()
 
     def area_of(self, name: str) -> QRectF:
@@ -193,27 +183,11 @@ class TimelineRows(QWidget):
         if margin != self.margin:
             self.margin = margin
         self.margin_changed.emit(self.margin)
-        self._place_button()
+        self._place_buttons()
         self._repaint()
 
-    def _place_button(self) -> None:
-        found = self._offset_painter()
-        automatic = None if found is None else found.row.automatic
-        apart = found is not None and automatic is not None and abs(automatic - found.offset) > 5e-4
-        if found is not None and automatic is not None and apart:
-            self._accept.setText(f"Use {offset_text(automatic)}")
-            self._accept.setToolTip("Take the offset that was found from the motion of both recordings")
-            size = self._accept.sizeHint()
-            area = self._areas[self._rows.index(found)]
-            width = min(size.width(), round(self.margin) - 12)
-            self._accept.setGeometry(6, round(area.bottom()) - size.height(), width, size.height())
-        self._accept.setVisible(apart)
-        for name, button in self._menus.items():
-            place = next((a for p, a in zip(self._rows, self._areas) if p.row.name == name), None)
-            if place is not None:
-                size = button.sizeHint()
-                button.setGeometry(6, round(place.bottom()) - size.height(), size.width(), size.height())
-            button.setVisible(place is not None)
+    def _place_buttons(self) -> None:
+        self._buttons.place(self._rows, self._areas, self.margin)
 
     def _repaint(self) -> None:
         self._picture = None
@@ -318,8 +292,6 @@ class TimelineRows(QWidget):
         low, high = self._time.span
         self.seeked.emit(min(max(self.clock_scale().value(at.x()), low), high))
 
-    def _take_automatic(self) -> None:
-        found = self._offset_painter()
-        if found is not None and found.row.automatic is not None:
-            self.set_offset(found.row.automatic)
-            self.offset_committed.emit(found.row.automatic)
+    def _take_automatic(self, offset: float) -> None:
+        self.set_offset(offset)
+        self.offset_committed.emit(offset)
