@@ -169,7 +169,7 @@ def _solve_options(solve: argparse.ArgumentParser) -> None:
 
 
 def _bench_options(bench: argparse.ArgumentParser) -> None:
-    bench.add_argument("suite", metavar="SUITE", help="accuracy, parts, scaling, ablation, short or clean")
+    bench.add_argument("suite", metavar="SUITE", help="accuracy, parts, scaling, ablation, short, clean or neural")
     bench.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="tables and records (default: %(default)s)")
 
     what = bench.add_argument_group("what is run")
@@ -180,6 +180,7 @@ def _bench_options(bench: argparse.ArgumentParser) -> None:
     what.add_argument("--seeds", type=int, metavar="N", help="sessions of each case and movement (default: 1)")
     what.add_argument("--frames", type=int, metavar="N", help="frames of a session (default: 450)")
     what.add_argument("--gaps", type=Path, metavar="FILE", help="statistics of real gaps, for the case real-gaps")
+    what.add_argument("--minutes", type=float, metavar="M", help="training of each network (suite neural; default: 8)")
     what.add_argument("--iterations", type=int, metavar="N", help="cap of the published method's optimisations")
 
     how = bench.add_argument_group("how it is run")

@@ -16,6 +16,10 @@ def run_bench(request: BenchRequest, progress: Progress) -> Outcome:
         from solver.bench.clean import clean_suite
 
         return clean_suite(request, progress)
+    if request.suite == "neural":
+        from solver.bench.neural import neural_suite
+
+        return neural_suite(request, progress)
     from solver.bench.bench import run_bench as run
 
     return run(request, progress)

@@ -28,6 +28,7 @@ class BenchRequest:
     limit : s that a run may take
     gaps : statistics of real gaps
     frames : of each session; None is the suite's own
+    minutes : of training of each network; None is the suite's own
     """
 
     suite: str
@@ -42,10 +43,11 @@ class BenchRequest:
     limit: float | None = None
     gaps: Path | None = None
     frames: int | None = None
+    minutes: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be run."""
-        for name in ("motion_count", "seeds", "workers", "iterations", "limit"):
+        for name in ("motion_count", "seeds", "workers", "iterations", "limit", "minutes"):
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise InputError(f"{value:g} is not possible", f"--{name.replace('_', '-')}", "give a number above 0")
@@ -63,7 +65,7 @@ class BenchRequest:
             words += [] if path is None else [f"--{name} {path.name}"]
         for name in ("methods", "cases"):
             words += [f"--{name} {','.join(getattr(self, name))}"] if getattr(self, name) else []
-        for name in ("seeds", "motion_count", "iterations", "limit", "frames"):
+        for name in ("seeds", "motion_count", "iterations", "limit", "frames", "minutes"):
             value, default = getattr(self, name), type(self).__dataclass_fields__[name].default
             words += [] if value == default else [f"--{name.replace('_', '-')} {value:g}"]
         return " ".join(words)
