@@ -10,6 +10,8 @@ _TRIALS = 150
 """Places at which a gap of the same length is tried, at most."""
 _INSIDE = (0.25, 0.5, 0.75)
 """Where in such a gap its error is looked at."""
+STRAIN = 0.15
+"""``strain`` of a frame that rides with the neighbours: a marker that was elsewhere among them afterwards has moved."""
 _TRUST_IN_ENDS, _LIKENESS = 0.25, (1 / 16, 16.0)
 """The error rises with this power of how much more than usual the ends of a gap differ, between these limits."""
 
@@ -35,7 +37,7 @@ def blend(gap: Gap, ends: np.ndarray, residual: np.ndarray) -> np.ndarray:
     return (1 - share) * residual[0] + share * residual[1]
 
 
-def drift(frames: np.ndarray, residual: np.ndarray, gap: Gap, ends: np.ndarray) -> float:
+def drift(frames: np.ndarray, residual: np.ndarray, gap: Gap, ends: np.ndarray, strain: float = 0.0) -> float:
     """Mean error, m, that blending leaves in gaps of this length, tried out where the residual is known.
 
     More than that where the two ends of this gap differ more than elsewhere, less where they agree.
@@ -45,29 +47,32 @@ def drift(frames: np.ndarray, residual: np.ndarray, gap: Gap, ends: np.ndarray) 
     frames : (N,) frames in which it is known, rising
     residual : (N, 3) m, zero where the method is right
     ends : the frames beside the gap that are seen, as ``ends_of`` has them
+    strain : share of the way from end to end that the error is never below
     """
     if len(frames) < 2:
         return np.inf
     if len(ends) == 0:
         return float(np.linalg.norm(residual - residual.mean(axis=0), axis=1).mean())
+    way = _end_to_end(frames, residual, ends)
     length, times = gap.length, 1
     while length >= 1:
         tried = _tried(frames, residual, length + (len(ends) == 2), (gap.first + gap.last) / 2, len(ends))
         if tried is not None:
-            error, step = tried
-            return times * error * _unlike(frames, residual, ends, times * step)
+            error, usual = times * tried[0], times * tried[1]
+            if way is not None and usual > 0:
+                error *= float(np.clip(way / usual, *_LIKENESS)) ** _TRUST_IN_ENDS
+            return max(error, strain * (way or 0.0))
         # Never seen for as long as that: what half the length leaves, and as much again.
         length, times = length // 2, times * 2
     return np.inf
 
 
-def _unlike(frames: np.ndarray, residual: np.ndarray, ends: np.ndarray, usual: float) -> float:
-    """By how much more than usual the residual is to be expected to move within a gap, from how it differs beyond."""
+def _end_to_end(frames: np.ndarray, residual: np.ndarray, ends: np.ndarray) -> float | None:
+    """m, how far the residual moves from one end of a gap to the other; None where it is not known at both."""
     rows = np.searchsorted(frames, ends)
-    if len(ends) < 2 or rows[1] >= len(frames) or (frames[rows] != ends).any() or usual <= 0:
-        return 1.0
-    times = float(np.linalg.norm(residual[rows[1]] - residual[rows[0]])) / usual
-    return float(np.clip(times, *_LIKENESS)) ** _TRUST_IN_ENDS
+    if len(ends) < 2 or rows[1] >= len(frames) or (frames[rows] != ends).any():
+        return None
+    return float(np.linalg.norm(residual[rows[1]] - residual[rows[0]]))
 
 
 def _tried(frames: np.ndarray, residual: np.ndarray, lag: int, near: float, ends: int) -> tuple[float, float] | None:
@@ -87,12 +92,8 @@ def _tried(frames: np.ndarray, residual: np.ndarray, lag: int, near: float, ends
     times = starts[:, None] + np.array([0.0, *inside, lag])
     after = np.clip(np.searchsorted(frames, times), 1, len(frames) - 1)
     left, right = frames[after - 1], frames[after]
-    # Where frames are further apart there is a gap, about which nothing can be tried; for a short lag all have to be
-    # known, if somewhere they are.
-    apart = (right - left).max(axis=1)
-    whole = apart <= max(1, lag // 4)
-    if not whole.any():
-        whole = apart <= max(2 * np.median(np.diff(frames)), 1 + lag // 8)
+    # Where frames are further apart there is a gap, about which nothing can be tried.
+    whole = (right - left).max(axis=1) <= max(1, lag // 4)
     if not whole.any():
         return None
     share = ((times - left) / (right - left))[whole, :, None]

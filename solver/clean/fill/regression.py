@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.clean.fill.blend import blend, drift, ends_of, throughout
+from solver.clean.fill.blend import STRAIN, blend, drift, ends_of, throughout
 from solver.clean.fill.frames import centred, local_frames
 from solver.clean.fill.neighbours import Neighbours, neighbours_of
 from solver.clean.fill.rigid import FEWEST, FLOOR_M, rigid_part
@@ -163,7 +163,7 @@ def _predicted(scene: _Scene, local: _Local, marker: int, gaps: list[Gap]) -> Pa
         guess = around @ slope + mean_y
         inside = guess[: len(span)] + blend(gap, ends, local.target[at_ends] - guess[len(span) :])
         values = np.einsum("nij,nj->ni", local.R_lab_local[rows], inside) + local.centre[rows]
-        error = drift(local.frames[local.seen], residual, gap, ends) * (1 + float(lost.mean()))
+        error = drift(local.frames[local.seen], residual, gap, ends, STRAIN) * (1 + float(lost.mean()))
         error *= _beyond(around[: len(span)], inverse, gram)
         found[gap] = Fill(marker, gap.first, gap.last, "regression", 0.0, error), values
     return found

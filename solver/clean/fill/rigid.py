@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.clean.fill.blend import blend, drift, ends_of, throughout
+from solver.clean.fill.blend import STRAIN, blend, drift, ends_of, throughout
 from solver.clean.fill.frames import centred, local_frames
 from solver.clean.fill.neighbours import Neighbours, neighbours_of
 from solver.clean.gaps import Fill, Filled, FillSettings, Gap, gaps_to_fill, together
@@ -53,5 +53,5 @@ def rigid_part(
     ends = ends_of(gap, both)
     inside = local.mean(axis=0) + blend(gap, ends, residual[np.searchsorted(known, ends)])
     values = np.einsum("nij,nj->ni", R_lab_local[len(known) :], inside) + centre[len(known) :]
-    error = drift(known, residual, gap, ends)
+    error = drift(known, residual, gap, ends, STRAIN)
     return Fill(gap.marker, gap.first, gap.last, "rigid", 0.0, error), values
