@@ -141,6 +141,7 @@ SESSION_ACTIONS = (
         "Ctrl+Shift+O",
     ),
     Action("session.example", "Open the example", "File", "Begin a session from the embedded recording.", open_example),
+    _input("marker_file", "markers", "Use other markers...", "Take another marker file, or the same where it is now."),
     _input("video_file", "video", "Add video...", "Take a video of the same movement."),
     _input("prior_file", "prior", "Add pose prior...", "Take poses that another program reconstructed from the video."),
     _input("camera_file", "camera", "Add camera...", "Take the camera from another trial's result."),

@@ -9,7 +9,7 @@ from app.actions import Action, Actions
 from widgets.dialogs.command_palette import PaletteEntry
 
 _SEPARATED = {
-    "session.example", "input.video", "session.save", "session.close", "select.all", "select.groups", "candidate.pin",
+    "session.example", "input.markers", "session.save", "session.close", "select.all", "select.groups", "candidate.pin",
     "offset.found", "range.selected", "body.less", "text.100", "window.layout", "play.forward", "range.from",
     "go.worst", "run.stop", "method.bundle", "export.picture", "help.about", "window.history",
 }  # fmt: skip

@@ -10,6 +10,8 @@ from PySide6.QtWidgets import QApplication, QMessageBox
 from app.models.workbench import Said
 from app.window.exporting import write_playback, write_turntable
 from solver import __version__
+from solver.errors import InputError
+from solver.io.atomic import cannot_write
 from widgets import theme
 from widgets.dialogs.command_palette import CommandPalette, PaletteEntry
 from widgets.dialogs.shortcut_sheet import ShortcutSheet
@@ -78,9 +80,10 @@ class Showing:
             try:
                 self.window.scene.save_png(path, 2.0)
             except OSError as error:
-                from solver.io.atomic import cannot_write
-
-                raise cannot_write(path, error) from None
+                if error.errno is not None:
+                    raise cannot_write(path, error) from None
+                remedy = "choose a folder you may write to, and a name that ends in .png"
+                raise InputError("cannot be written", path, remedy) from None
         elif name == "turntable":
             write_turntable(self.window, path)
         else:

@@ -108,11 +108,23 @@ def answer(qapp: QApplication) -> Iterator[Callable[[Callable[[Any], None]], Non
     failed: list[BaseException] = []
     timer = QTimer(interval=20)
 
+    patience = [250]
+
     def look() -> None:
         dialog = QApplication.activeModalWidget()
-        if dialog is None or not waiting or not dialog.isVisible():
-            return
-        act = waiting.pop(0)
+        if dialog is None or not dialog.isVisible():
+            patience[0] = 500
+        elif waiting:
+            act = waiting.pop(0)
+            QTimer.singleShot(0, dialog, lambda: take(act, dialog))  # not here: the next dialog needs this timer
+        else:
+            patience[0] -= 1
+            if patience[0] <= 0:
+                patience[0] = 500
+                failed.append(AssertionError(f"nobody answers {dialog.windowTitle()!r}"))
+                dialog.close()
+
+    def take(act: Callable[[Any], None], dialog: Any) -> None:
         try:
             act(dialog)
         except BaseException as error:
