@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import datetime
 import json
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from solver import __version__
+from solver.bench.clean_tables import CleanTables, FillRow, OutlierRow, plain
+from solver.bench.machine import machine
 from solver.bench.request import BenchRequest
 from solver.clean.fill import METHODS, fill
 from solver.clean.gap_model import GapModel, draw_gaps, draw_shifts, heavy_tailed, read_gap_statistics
@@ -25,90 +30,13 @@ RATE = 60.0
 """Hz that gaps are filled at."""
 SHARES = (0.05, 0.2)
 """Of the samples that are there, hidden."""
+_SHORT = ("regression", "edm", "local")
+"""Methods of the short table: the defaults, and the published filling."""
 _JUMPING = 0.01
 _SMALLEST, _LARGEST = 0.01, 0.10
 _SEEN = 0.1
 _FEWEST_MARKERS, _FEWEST_FRAMES = 10, 60
 _EVERYTHING = FillSettings(min_confidence=0.0, max_gap=None)
-
-
-@dataclass(frozen=True)
-class FillRow:
-    """One method on one recording, over all seeds.
-
-    Attributes
-    ----------
-    recording, frames, markers, method, lost : which; ``lost`` is the share of samples hidden
-    mean_cm, median_cm, p95_cm : distance of filled samples from the truth, everything filled that the method can
-    filled : share of the hidden samples that is
-    sure_mean_cm, sure_filled : the same with the default limits of confidence and length
-    expected_cm : mean of the errors that were expected
-    rank_correlation : of confidence and minus error, over the gaps (Spearman)
-    frames_per_s : of processor time
-    """
-
-    recording: str
-    frames: int
-    markers: int
-    method: str
-    lost: float
-    mean_cm: float
-    median_cm: float
-    p95_cm: float
-    filled: float
-    sure_mean_cm: float
-    sure_filled: float
-    expected_cm: float
-    rank_correlation: float
-    frames_per_s: float
-
-
-@dataclass(frozen=True)
-class OutlierRow:
-    """One way of finding outliers on one recording, over all seeds; ``kind``: single samples, or spans of up to 5."""
-
-    recording: str
-    rate: float
-    kind: str
-    method: str
-    f1: float
-    precision: float
-    recall: float
-
-
-@dataclass(frozen=True)
-class CleanTables:
-    """All rows, and what was left out and why."""
-
-    fills: tuple[FillRow, ...]
-    outliers: tuple[OutlierRow, ...]
-    left_out: tuple[str, ...]
-
-    def markdown(self) -> str:
-        """Both tables; the mean over the recordings comes last."""
-        text = [
-            "| recording | frames x markers | lost | method | mean error cm | median | 95 % | filled | "
-            "with the limits: mean cm | filled | expected cm | rank correlation | frames/s |",
-            "|---|---|---|---|---|---|---|---|---|---|---|---|---|",
-        ]
-        for row in (*self.fills, *_means(self.fills)):
-            text.append(
-                f"| {row.recording} | {row.frames} x {row.markers} | {100 * row.lost:.0f} % | {row.method} | "
-                f"{row.mean_cm:.2f} | {row.median_cm:.2f} | {row.p95_cm:.2f} | {100 * row.filled:.0f} % | "
-                f"{row.sure_mean_cm:.2f} | {100 * row.sure_filled:.0f} % | {row.expected_cm:.2f} | "
-                f"{row.rank_correlation:.2f} | {row.frames_per_s:.0f} |"
-            )
-        text += [
-            "",
-            "| recording | Hz | outliers | method | F1 | precision | recall |",
-            "|---|---|---|---|---|---|---|",
-        ]
-        text += [
-            f"| {row.recording} | {row.rate:g} | {row.kind} | {row.method} | {row.f1:.3f} | {row.precision:.3f} | "
-            f"{row.recall:.3f} |"
-            for row in self.outliers
-        ]
-        return "\n".join([*text, "", *(f"Left out: {said}" for said in self.left_out)]) + "\n"
 
 
 def run_clean_bench(
@@ -147,7 +75,7 @@ def run_clean_bench(
     if out is not None:
         make_folder(out)
         write_text_atomic(out / "clean.md", tables.markdown())
-        write_text_atomic(out / "clean.json", json.dumps(_plain(asdict(tables)), indent=1) + "\n")
+        write_text_atomic(out / "clean.json", json.dumps(plain(asdict(tables)), indent=1) + "\n")
     progress(1.0, "done")
     return tables
 
@@ -162,8 +90,31 @@ def clean_suite(request: BenchRequest, progress: Progress = silent) -> Outcome:
     if request.motions is None or not request.motions.is_dir():
         raise InputError("names no folder of recordings", "--motions", "name a folder of C3D, TRC or CSV files")
     tables = run_clean_bench(request.motions, request.gaps, request.out, request.seeds, progress)
-    lines = (*tables.markdown().splitlines(), f"Tables are in {request.out}.")
+    header = {
+        "suite": "clean",
+        "command": request.command,
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        "version": __version__,
+        "machine": machine(),
+        "seeds": request.seeds,
+    }
+    short = _said(header) + tables.markdown(_SHORT, _SHORT)
+    write_text_atomic(request.out / "bench.md", short)
+    write_text_atomic(request.out / "bench.json", json.dumps(header | plain(asdict(tables)), indent=1) + "\n")
+    lines = (*tables.markdown().splitlines(), f"Tables are in {request.out}; bench.md has those of the defaults.")
     return Outcome(summary={"suite": "clean", "out": str(request.out), **asdict(tables)}, lines=lines)
+
+
+def _said(header: dict[str, Any]) -> str:
+    on = header["machine"]
+    return (
+        f"`{header['command']}`\n\n"
+        f"{header['date']}, Markerscope {header['version']}, {on['processor']}, {on['cores']} cores, {on['system']}, "
+        f"Python {on['python']}; one thread, other work beside it.\n\n"
+        f"Real recordings at {RATE:g} Hz, outliers at their own rate too; {header['seeds']} draws of gaps "
+        "and jumps each. What is hidden is what is judged: where a recording's own tracks are broken, so is the truth. "
+        "`found untouched` counts samples cut from a recording as it is.\n\n"
+    )
 
 
 def read_recordings(folder: Path) -> tuple[list[tuple[str, np.ndarray, float]], tuple[str, ...]]:
@@ -256,10 +207,11 @@ def _within(found: Filled, usual: FillSettings) -> np.ndarray:
 def _outliers(name: str, truth: np.ndarray, rate: float, seeds: int) -> list[OutlierRow]:
     rows = []
     present = np.isfinite(truth).all(axis=2)
+    methods: tuple[OutlierMethod, ...] = ("local", "prominence")
+    untouched = {method: find_outliers(truth, rate, OutlierSettings(method=method)) for method in methods}
     for kind in ("single samples", "spans of 1 to 5"):
-        methods: tuple[OutlierMethod, ...] = ("local", "prominence")
         for method in methods:
-            right, found_in_all, true_in_all = 0, 0, 0
+            right, found_in_all, true_in_all, own = 0, 0, 0, 0
             for seed in range(seeds):
                 shifts = draw_shifts(present, _JUMPING, _SMALLEST, _LARGEST, seed)
                 if kind != "single samples":
@@ -269,9 +221,11 @@ def _outliers(name: str, truth: np.ndarray, rate: float, seeds: int) -> list[Out
                 right += int((found & true).sum())
                 found_in_all += int(found.sum())
                 true_in_all += int(true.sum())
+                own += int((found & untouched[method] & ~true).sum())
             precision, recall = right / max(found_in_all, 1), right / max(true_in_all, 1)
-            f1 = 2 * right / max(found_in_all + true_in_all, 1)
-            rows.append(OutlierRow(name, rate, kind, method, f1, precision, recall))
+            f1, apart = (2 * right / max(found_in_all - k + true_in_all, 1) for k in (0, own))
+            count = int(untouched[method].sum())
+            rows.append(OutlierRow(name, rate, kind, method, f1, precision, recall, count, apart))
     return rows
 
 
@@ -284,27 +238,3 @@ def _stretched(shifts: np.ndarray, present: np.ndarray, seed: int) -> np.ndarray
         if end + 1 < len(shifts) and present[t : end + 1, m].all() and not shifts[t + 1 : end + 2, m].any():
             shifts[t:end, m] = shifts[t, m]
     return shifts
-
-
-def _means(rows: Sequence[FillRow]) -> list[FillRow]:
-    """The mean over the recordings, for each method and share."""
-    means = []
-    for method, lost in dict.fromkeys((row.method, row.lost) for row in rows):
-        alike = [asdict(row) for row in rows if (row.method, row.lost) == (method, lost)]
-        figures = {
-            key: float(np.nanmean([row[key] for row in alike]))
-            for key in alike[0]
-            if key not in ("recording", "frames", "markers", "method")
-        }
-        frames, markers = sum(row["frames"] for row in alike), round(np.mean([row["markers"] for row in alike]))
-        means.append(FillRow(f"mean of {len(alike)}", frames, markers, method, **figures))
-    return means
-
-
-def _plain(value: object) -> object:
-    """JSON has no NaN."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Sequence
 from typing import Any
 
@@ -49,35 +51,58 @@ def changes_of(cleaned: Cleaned) -> dict[str, Any]:
     }
 
 
+TITLES = ("marker", "rows", "seconds", "what", "how", "confidence", "expected error (mm)")
+
+
 def lines_of(changes: dict[str, Any]) -> tuple[str, ...]:
     """The same for a person: a table of all that was done, then what is left and what is proposed."""
-    rows = [
-        *((row, "cut", "outlier", "", "") for row in changes["outliers"]),
-        *(
-            (row, "filled", row["method"], f"{row['confidence']:.2f}", f"{1000 * row['expected_error_m']:.1f}")
-            for row in changes["fills"]
-        ),
-        *((row, "left", "", "", "") for row in changes["left"]),
-    ]
     table = [
         (
             row["marker"],
             f"{row['first_row']}-{row['last_row']}",
             f"{row['first_s']:.3f}-{row['last_s']:.3f}",
-            what,
-            how,
-            sure,
-            error,
+            row["what"],
+            row.get("method", ""),
+            f"{row['confidence']:.2f}" if "confidence" in row else "",
+            f"{1000 * row['expected_error_m']:.1f}" if "expected_error_m" in row else "",
         )
-        for row, what, how, sure, error in sorted(rows, key=lambda one: (one[0]["index"], one[0]["first_row"]))
+        for row in _by_marker(changes)
     ]
-    titles = ("marker", "rows", "seconds", "what", "how", "confidence", "expected error (mm)")
     return (
-        *(aligned([titles, *table]) if table else ()),
+        *(aligned([TITLES, *table]) if table else ()),
         *(f"{name} is never seen and stays lost." for name in changes["never_seen"]),
         *(f"Proposed edit {edit['number']}: {edit['sentence']}" for edit in changes["proposals"]),
         *changes["notes"],
     )
+
+
+def csv_of(changes: dict[str, Any]) -> str:
+    """The same for a spreadsheet: a line for each span cut, filled or left, and each edit made or proposed."""
+    names = ("what", "marker", "other", "first_row", "last_row", "first_s", "last_s", "method", "confidence")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*names, "expected_error_m", "sentence"])
+    for row in _by_marker(changes):
+        writer.writerow([*(row.get(name, "") for name in names), row.get("expected_error_m", ""), ""])
+    for name in changes["never_seen"]:
+        writer.writerow(["never seen", name, *[""] * 9])
+    for sentence in changes.get("edits_made", ()):
+        writer.writerow(["edit made", *[""] * 9, sentence])
+    for edit in changes["proposals"]:
+        span = (edit["first_row"], edit["last_row"])
+        writer.writerow(["edit proposed", *edit["markers"], *span, "", "", edit["kind"], "", "", edit["sentence"]])
+    return text.getvalue()
+
+
+def _by_marker(changes: dict[str, Any]) -> list[dict[str, Any]]:
+    """Every span that was cut, filled or left, by marker, then by row."""
+    kinds = (
+        ("outliers", {"what": "cut", "method": "outlier"}),
+        ("fills", {"what": "filled"}),
+        ("left", {"what": "left"}),
+    )
+    rows = [row | said for name, said in kinds for row in changes[name]]
+    return sorted(rows, key=lambda row: (row["index"], row["first_row"]))
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:

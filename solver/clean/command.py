@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from solver import __version__
-from solver.clean.changes import changes_of, lines_of
+from solver.clean.changes import changes_of, csv_of, lines_of
 from solver.clean.clean import Cleaned, CleanSettings, clean
 from solver.clean.request import CleanRequest
 from solver.clean.swaps import apply_proposals
@@ -58,11 +58,13 @@ def clean_file(request: CleanRequest, progress: Progress = silent) -> Outcome:
     }
     listed = request.out.with_suffix(".changes.json")
     write_text_atomic(listed, json.dumps(about | changes, indent=1, allow_nan=False) + "\n")
+    table = request.out.with_suffix(".changes.csv")
+    write_text_atomic(table, csv_of(changes))
     lines = (
         *markers.notes,
         *(f"Edit made: {sentence}" for sentence in made),
         *lines_of(changes),
-        f"Written to {request.out}; every change is in {listed.name} beside it.",
+        f"Written to {request.out}; every change is in {listed.name} and {table.name} beside it.",
     )
     return Outcome(summary={"out": str(request.out), **_totals(cleaned), **changes}, lines=lines)
 

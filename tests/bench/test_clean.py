@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from app.cli import main
-from solver.bench.clean import resampled, run_clean_bench
+from benchmarks.readme import put
+from solver.bench.clean import _outliers, resampled, run_clean_bench
 from solver.errors import InputError
 from solver.io.export_c3d import write_c3d
 from solver.markers import Markers
@@ -48,9 +49,23 @@ def test_an_exact_method_has_no_error_and_every_sample_is_counted(tmp_path: Path
     for row in tables.outliers:
         assert row.f1 == pytest.approx(2 * row.precision * row.recall / (row.precision + row.recall))
         assert row.f1 > 0.95 or row.method == "prominence"
+        assert row.own == 0, "nothing jumps in it"
+        assert row.f1_apart == row.f1
     assert len(tables.left_out) == 1
     assert "mean of 1" in (tmp_path / "out" / "clean.md").read_text()
     assert len(json.loads((tmp_path / "out" / "clean.json").read_text())["fills"]) == 4
+
+
+def test_jumps_that_a_recording_came_with_are_told_apart() -> None:
+    """Samples that jump all by themselves were not displaced on purpose: each is a false one, and can be set aside."""
+    rng = np.random.default_rng(3)
+    path = np.cumsum(rng.normal(scale=1e-4, size=(400, 12, 3)), axis=0) + rng.uniform(-1, 1, (1, 12, 3))
+    path[5:395:10, 4] += [0, 0.1, 0]
+    rows = [row for row in _outliers("made up", path, 60.0, 2) if row.method == "local"]
+    for row in rows:
+        assert row.own == 39
+        assert row.precision < 0.85
+        assert row.f1_apart > 0.95 > row.f1
 
 
 def test_resampling_keeps_a_cubic_and_what_is_lost() -> None:
@@ -63,6 +78,21 @@ def test_resampling_keeps_a_cubic_and_what_is_lost() -> None:
     assert np.abs(found[there, 0, 0] - at[there] ** 2).max() < 1e-9
     assert not there[np.abs(at - 50) < 1].any()
     assert np.array_equal(resampled(positions, 100.0, 50.0), positions[::2], equal_nan=True)
+
+
+def test_the_command_leaves_a_table_for_the_readme(tmp_path: Path) -> None:
+    (tmp_path / "recordings").mkdir()
+    recording(tmp_path / "recordings" / "swing.c3d")
+    words = ["bench", "clean", "--motions", str(tmp_path / "recordings"), "--out", str(tmp_path / "out"), "--quiet"]
+    assert main(words) == 0
+    readme = tmp_path / "README.md"
+    readme.write_text("<!-- bench:clean begin -->\n<!-- bench:clean end -->\n")
+    assert put(tmp_path / "out", readme) == "clean"
+    text = readme.read_text()
+    assert "`markerscope bench clean --motions recordings`" in text
+    assert "| swing | 300 x 12 | 5 % | regression |" in text
+    assert "| swing | 120 | single samples | local |" in text
+    assert "linear" not in text, "all methods are in clean.md"
 
 
 def test_a_folder_has_to_be_named(tmp_path: Path, capsys) -> None:

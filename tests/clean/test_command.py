@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -63,6 +64,29 @@ def test_every_change_is_listed_in_words_and_in_the_file_beside_it(trial: Path, 
     for word in ("B       31-61", "D       81-81", "cut", "G is never seen", "Proposed edit 1: E and F look exchanged"):
         assert word in text, text
     assert outcome.summary["fills"] == listed["fills"]
+
+
+def test_every_change_is_a_line_of_a_table(trial: Path, tmp_path: Path) -> None:
+    clean_file(CleanRequest(trial, tmp_path / "clean.c3d"))
+    listed = json.loads((tmp_path / "clean.changes.json").read_text())
+    with (tmp_path / "clean.changes.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    kinds = [row["what"] for row in rows]
+    assert kinds.count("cut") == len(listed["outliers"]) == 1
+    assert kinds.count("filled") == len(listed["fills"]) == 2
+    assert kinds.count("left") == len(listed["left"])
+    fill = next(row for row in rows if row["what"] == "filled" and row["marker"] == "B")
+    assert (fill["first_row"], fill["last_row"], fill["method"]) == ("31", "61", "regression")
+    assert float(fill["confidence"]) == listed["fills"][0]["confidence"]
+    assert float(fill["expected_error_m"]) == listed["fills"][0]["expected_error_m"]
+    assert float(fill["first_s"]) == pytest.approx(30 / RATE, abs=1e-5)
+    assert next(row for row in rows if row["what"] == "never seen")["marker"] == "G"
+    edit = next(row for row in rows if row["what"] == "edit proposed")
+    assert (edit["method"], edit["marker"], edit["other"], edit["first_row"]) == ("swap", "E", "F", "151")
+    assert edit["sentence"] == listed["proposals"][0]["sentence"]
+    assert len(rows) == sum(kinds.count(kind) for kind in ("cut", "filled", "left", "never seen", "edit proposed"))
+    clean_file(CleanRequest(trial, tmp_path / "clean.c3d", apply=(1,)))
+    assert "edit made" in (tmp_path / "clean.changes.csv").read_text()
 
 
 def test_a_proposed_edit_is_made_when_asked_for(trial: Path, tmp_path: Path) -> None:
