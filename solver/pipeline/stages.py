@@ -78,7 +78,7 @@ FITTED_TO = ("clean", "prior", "landmarks", "sync", "body_file")
 GRAPH = (
     Stage("markers", 1, MarkerSettings, ("marker_file",), inputs.read_markers, Markers, _said_markers, cost=0.5),
     Stage(
-        "clean", 1, CleaningSettings, ("markers",), cleaning.clean_markers, Cleaned, cleaning.said_cleaning, cost=0.5
+        "clean", 2, CleaningSettings, ("markers",), cleaning.clean_markers, Cleaned, cleaning.said_cleaning, cost=0.5
     ),
     Stage(
         "landmarks",
