@@ -158,6 +158,34 @@ def test_edits_by_hand_are_made_before_the_cleaning_and_unknown_markers_refused(
         clean_markers({"markers": given}, CleaningSettings(keep=((9, 0, 1),)), silent)
 
 
+def test_a_join_that_is_accepted_in_a_session_is_filled_well() -> None:
+    """A track that broke and went on in another column cannot be filled before it is joined, and can after."""
+    truth = rigid()
+    pieces = np.concatenate([truth, np.full((len(truth), 1, 3), np.nan)], axis=1)
+    pieces[110:, 8], pieces[100:, 2] = truth[110:, 2], np.nan
+    given = of(pieces)
+    fill = CleaningSettings(fill="regression", max_gap=0.5)
+    before = clean_markers({"markers": given}, fill, silent)
+    assert np.isnan(before.markers.positions[100:, 2]).all(), "half a trial is no gap to be filled"
+    (edit,) = before.proposals
+    joined = replace(fill, joins=((*edit.markers, edit.frame, edit.last),))
+    after = clean_markers({"markers": given}, joined, silent)
+    assert [(f.marker, f.first, f.last) for f in after.fills] == [(2, 100, 109)]
+    off = np.linalg.norm(after.markers.positions[:, :8] - truth, axis=2).max()
+    assert off < 1e-6, f"{1e3 * off:.4f} mm"
+    assert np.isnan(after.markers.positions[:, 8]).all()
+    assert not after.proposals
+
+
+def test_a_marker_that_is_another_after_the_gap_is_not_filled() -> None:
+    """The column goes on with another place on the body: whatever is put between the two is wrong."""
+    truth = rigid()
+    given = lose(truth, (2, 100, 109))
+    given[110:, 2] = truth[110:, 2] + truth[110:, 5] - truth[110:, 0]
+    fills = clean(of(given), CleanSettings(OutlierSettings(method="none"))).fills
+    assert (2, 100, 109) not in {(f.marker, f.first, f.last) for f in fills}, fills
+
+
 def test_what_the_stage_fills_counts_as_measured_nowhere() -> None:
     markers = damaged()
     cleaned = clean_markers({"markers": markers}, CleaningSettings(fill="regression"), silent)
