@@ -170,3 +170,48 @@ def test_other_data_keeps_time_and_loop_inside(clock: Clock) -> None:
     clock.set_loop((2.5, 5.0))
     clock.set_timing(Timing(first=2.0, rate=100.0, frames=101))
     assert (clock.time, clock.loop) == (3.0, (2.5, 3.0))
+
+
+NTSC = np.arange(18_000) * 1001 / 30_000  # s, the stamps of a video at 29.97 frames a second
+
+
+def test_29_97_against_30_is_told_apart_at_every_frame() -> None:
+    """Markers at 30 Hz and the video at 29.97: after 33.4 s one frame more of the markers has passed."""
+    clock = Clock(Timing(rate=30.0, frames=18_001, video=NTSC))
+    for frame in (0, 1, 500, 1_000, 1_002, 9_000, 17_999):
+        clock.seek_marker_frame(frame)
+        assert clock.marker_frame == frame
+        assert clock.video_frame == round(frame / 30 * 29.97002997), frame
+        assert abs(NTSC[clock.video_frame] - clock.time) <= 1001 / 60_000 + 1e-9
+    assert clock.video_frame == 17_981, "the streams are eighteen frames apart, and the readouts say so"
+
+
+@given(st.floats(0.0, 3.0), st.sampled_from(SPEEDS), st.floats(0.0, 0.02))
+def test_playing_shows_what_seeking_shows(seconds: float, speed: float, jitter: float) -> None:
+    """Wherever playing is after some seconds, whatever was dropped, both streams show what a seek there shows."""
+    playing, sought = Clock(TIMING), Clock(TIMING)
+    playing.set_speed(speed)
+    playing.play()
+    playing.tick(50.0)
+    playing.tick(50.0 + seconds / speed * 0.4 + jitter)
+    playing.tick(50.0 + seconds / speed)
+    playing.stop()
+    sought.seek(min(2.0 + seconds, 5.0))
+    assert (playing.marker_frame, playing.video_frame) == (sought.marker_frame, sought.video_frame)
+
+
+@given(st.floats(2.0, 4.5), st.floats(0.05, 0.5), st.sampled_from(SPEEDS), st.lists(st.floats(0.001, 0.4), max_size=30))
+def test_a_loop_is_never_left(start: float, length: float, speed: float, steps: list[float]) -> None:
+    clock = Clock(TIMING)
+    clock.set_loop((start, start + length))
+    clock.set_speed(speed)
+    clock.play()
+    now = 0.0
+    assert clock.loop is not None
+    for step in steps:
+        now += step
+        clock.tick(now)
+        assert clock.playing and clock.loop[0] - 1e-9 <= clock.time <= clock.loop[1] + 1e-9
+    assert clock.home() is None and clock.time == pytest.approx(clock.loop[0], abs=0.006)
+    clock.end()
+    assert clock.time == pytest.approx(clock.loop[1], abs=0.006)
