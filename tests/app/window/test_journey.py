@@ -129,7 +129,9 @@ def test_the_whole_journey(open_window: Callable[[], MainWindow], spin: Spin, tm
     spin(lambda: len(window.shown.compared("fit")) == 1, "the first fit")
     spin()
     residual = next(row for row in window.timelines.rows.shown_rows() if row.name.startswith("Residual"))
-    assert len(residual.curves) == 2, "both fits are compared along the session"
+    fitted = [curve for curve in residual.curves if curve.framed]
+    assert len(fitted) == 2, "both fits are compared along the session"
+    assert len(residual.curves) == 3, "the candidate that is selected has its own, at its keyframes"
 
     # Scrubbing: everything follows the one clock.
     first, film = picture(window.scene), picture(window.video)
