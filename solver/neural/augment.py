@@ -25,8 +25,8 @@ class FrameNoise:
     shifted, shift_mm : chance that a seen marker is displaced, and the farthest along each axis, drawn evenly
     """
 
-    lost: float = 0.25
-    whole: float = 0.4
+    lost: float = 0.15
+    whole: float = 0.6
     filled_mm: float = 25.0
     shifted: float = 0.003
     shift_mm: float = 30.0

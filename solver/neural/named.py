@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from torch import Tensor
 
 KIND = "solver"
+RATES = {"heterogeneous": 4e-3, "holden": 5e-4}
+"""Of learning, where none is given: filters of single edges stand more than wide dense layers."""
 _FRAMES_AT_ONCE = 2048
 _HAND_SHARE = 0.1
 """Of the time of a training, for each hand; the rest is the body's."""
@@ -84,6 +86,7 @@ def train_solver(
     choice: Choice,
     settings: TrainSettings,
     *,
+    start: Solver | None = None,
     checkpoint: Path | None = None,
     progress: Progress = silent,
 ) -> tuple[Solver, dict[Group, Trained]]:
@@ -93,6 +96,7 @@ def train_solver(
     ----------
     samplers : what is learnt from, and what is judged on
     settings : of the whole; hands take a tenth of steps and time each
+    start : a solver of the same layout that is trained further, its networks as they are; ``choice`` says the rest
     checkpoint : see ``train``; each network has its own beside it
     """
     groups = groups_of(layout, split=choice.split)
@@ -100,14 +104,16 @@ def train_solver(
     parts, results, done = [], {}, 0.0
     for group in groups:
         task = make_task(body, layout, group, *samplers, choice)
+        before = None if start is None else next((p for p in start.parts if p.group == group), None)
+        if before is not None:
+            task = replace(task, network=before.network)
         own = _share_of(settings, shares[group])
+        own = replace(own, rate=settings.rate or RATES[task.network.kind])
         beside = None if checkpoint is None else checkpoint.with_name(f"{checkpoint.stem}.{group}{checkpoint.suffix}")
         what = f"{layout.digest} {group} {task.network.kind} {settings.seed}"
         reporter = part_of(progress, done, done + shares[group])
-        found = train(
-            task.network.initial(settings.seed), task.loss, task.judge, own, checkpoint=beside, what=what,
-            progress=reporter,
-        )  # fmt: skip
+        params = task.network.initial(settings.seed) if before is None else before.params
+        found = train(params, task.loss, task.judge, own, checkpoint=beside, what=what, progress=reporter)
         results[group] = found
         parts.append(Part(group, task.joints, task.chosen, task.network, found.params))
         done += shares[group]

@@ -26,6 +26,8 @@ Loss = Callable[[Params, "Generator"], dict[str, "Tensor"]]
 Judge = Callable[[Params], dict[str, float]]
 """Figures on what is held out; ``score`` among them, the smaller the better."""
 
+_USUAL = 1e-3
+
 
 @dataclass(frozen=True)
 class TrainSettings:
@@ -34,7 +36,7 @@ class TrainSettings:
     Attributes
     ----------
     steps, seconds : when to stop, whichever comes first; at least one is given
-    rate : of learning at its highest
+    rate : of learning at its highest; None takes what suits the network, or 1e-3
     warm : steps in which it rises to that
     last : share of it that is left at the end, along half a cosine
     decay : of weights
@@ -48,7 +50,7 @@ class TrainSettings:
 
     steps: int | None = None
     seconds: float | None = 480.0
-    rate: float = 1e-3
+    rate: float | None = None
     warm: int = 100
     last: float = 0.01
     decay: float = 0.0
@@ -138,7 +140,7 @@ def train(
         state = _State(_copied(params), _copied(params), _copied(params))
         for value in state.params.values():
             value.requires_grad_(True)
-        optimiser = torch.optim.AdamW(list(state.params.values()), settings.rate, weight_decay=settings.decay)
+        optimiser = torch.optim.AdamW(list(state.params.values()), settings.rate or _USUAL, weight_decay=settings.decay)
         if checkpoint is not None and checkpoint.is_file():
             _resume(checkpoint, what, state, optimiser)
         started, saved, before = time.monotonic(), time.monotonic(), state.seconds
@@ -194,7 +196,7 @@ def _share(state: _State, settings: TrainSettings) -> float:
 
 def _rate(state: _State, settings: TrainSettings) -> float:
     falling = settings.last + (1 - settings.last) * 0.5 * (1 + math.cos(math.pi * _share(state, settings)))
-    return settings.rate * falling * min(1.0, (state.step + 1) / max(settings.warm, 1))
+    return (settings.rate or _USUAL) * falling * min(1.0, (state.step + 1) / max(settings.warm, 1))
 
 
 def _stale(state: _State, settings: TrainSettings) -> bool:
