@@ -15,7 +15,9 @@ from PySide6.QtWidgets import QApplication, QToolButton, QWidget
 
 from tests.widgets.drawn import pixels
 from widgets import palette, theme
+from widgets.plots.curve_paint import shortened
 from widgets.plots.decimate import Counts, envelope, shown_frames
+from widgets.plots.ink import legible
 from widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
 from widgets.plots.scales import Scale, clock, log_ticks, number, ticks, time_ticks
 from widgets.plots.timelines import Timelines
@@ -307,3 +309,30 @@ def test_a_logarithmic_axis_has_two_numbers_at_least(low: float, high: float, mo
 @given(st.floats(0.01, 1e4), st.floats(20, 400), st.floats(10, 60))
 def test_an_axis_has_two_numbers_however_low_it_is(high: float, tall: float, apart: float) -> None:
     assert len(Scale(0, high, tall, 0).ticks(apart)) >= 2
+
+
+@given(st.lists(st.floats(1, 400), min_size=1, max_size=8), st.floats(50, 900))
+def test_names_share_their_room_the_longest_giving_way_first(widths: list[float], room: float) -> None:
+    longest = shortened(widths, room)
+    shown = [min(width, longest) for width in widths]
+    assert sum(shown) <= room + 1e-6 or longest == pytest.approx(room / len(widths))
+    if sum(widths) <= room:
+        assert shown == widths
+    elif longest < max(widths):
+        assert sum(shown) == pytest.approx(room), "no room is wasted while a name is cut"
+
+
+def test_every_curves_name_is_shown_however_many_there_are(qapp: QApplication) -> None:
+    inks = palette.categorical(5)
+    curves = tuple(Curve(f"a fit with quite a long name {k}", np.full(1000, k + 1.0), inks[k]) for k in range(5))
+    made = Timelines()
+    made.resize(700, 220)
+    made.set_span(0, 10)
+    made.set_rows([CurveRow("Residual", TIME, curves, "mm")])
+    made.show()
+    qapp.processEvents()
+    picture, area = pixels(made.rows), made.rows.area_of("Residual")
+    head = picture[round(area.top()) + 1 : round(area.top()) + 20, round(area.left()) : round(area.right())]
+    for k, ink in enumerate(inks):
+        assert (np.abs(head.astype(int) - legible(ink)).max(axis=2) <= 12).sum() >= 8, f"the name of curve {k}"
+    made.close()

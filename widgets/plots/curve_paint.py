@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QFontMetricsF, QPainter
@@ -40,18 +42,29 @@ def draw_curve(
 
 
 def legend(painter: QPainter, area: QRectF, curves: tuple[Curve, ...]) -> None:
-    """Names of the curves in the upper right corner, on a ground of their own."""
+    """Names of the curves in the upper right corner, on a ground of their own; the longest are shortened first."""
     metrics, look = QFontMetricsF(painter.font()), colours()
     right = area.right() - 6
+    longest = shortened([metrics.horizontalAdvance(curve.label) + 30 for curve in curves], right - area.left() - 10)
     for curve in reversed(curves):
-        width = metrics.horizontalAdvance(curve.label) + 26
-        if right - width < area.left() + 40:
-            break
+        text = metrics.elidedText(curve.label, Qt.TextElideMode.ElideRight, max(longest - 30, 12))
+        width = metrics.horizontalAdvance(text) + 26
         box = QRectF(right - width, area.top() + 2, width, metrics.height() + 2)
         painter.fillRect(box, colour(look.base, 215))
         painter.setPen(pen(legible(curve.colour), 2.0, curve.dashed))
         middle = box.center().y()
         painter.drawLine(QPointF(box.left() + 4, middle), QPointF(box.left() + 18, middle))
         painter.setPen(colour(look.text))
-        painter.drawText(box.adjusted(22, 0, 0, 0), int(Qt.AlignmentFlag.AlignVCenter), curve.label)
+        painter.drawText(box.adjusted(22, 0, 0, 0), int(Qt.AlignmentFlag.AlignVCenter), text)
         right -= width + 4
+
+
+def shortened(widths: Sequence[float], room: float) -> float:
+    """The width beyond which each of several is cut, so that together they have room; the widest where all have."""
+    left = sorted(widths)
+    for k, width in enumerate(left):
+        share = room / (len(left) - k)
+        if width > share:
+            return share
+        room -= width
+    return max(widths, default=0.0)

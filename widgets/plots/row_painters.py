@@ -44,7 +44,7 @@ class PresencePainter:
 
     def height(self, em: float) -> float:
         """Some two pixels a marker where there is little room, and room for two lines of text."""
-        return max(2.2 * em, min(3.0 * self.markers, 4.6 * em))
+        return max(2.2 * em, min(3.0 * self.markers, 4.2 * em))
 
     def paint(self, painter: QPainter, area: QRectF, x: Scale) -> None:
         """Draw the strips as one picture."""
@@ -189,7 +189,7 @@ class CurvePainter:
     def height(self, em: float) -> float:
         """Four lines of text, the first for the names where there are several curves."""
         self._names = 1.15 * em if len(self.row.curves) > 1 else 0.0
-        return 4.0 * em + 0.5 * self._names
+        return 3.8 * em + 0.5 * self._names
 
     def y_scale(self, area: QRectF) -> Scale:
         """Values to pixels, below the names."""
