@@ -24,6 +24,7 @@ def train_options(train: argparse.ArgumentParser) -> None:
 
     how = train.add_argument_group("how it learns")
     how.add_argument("--minutes", type=float, metavar="M", help="that it may take (default: 15)")
+    how.add_argument("--steps", type=int, metavar="N", help="that it may take, if the minutes do not end before")
     how.add_argument("--resume", action="store_true", help="go on with a training that was stopped")
     how.add_argument("--seed", type=int, metavar="N", help="of every random choice (default: 0)")
 

@@ -44,7 +44,7 @@ def train_network(request: TrainRequest, progress: Progress = silent) -> Outcome
     ready = load(request.start)
     ground, places, labels = _ground(request, part_of(progress, 0.0, 0.05))
     clips = motions_of(request.motions, request.made, request.seed)
-    training = replace(TUNING, seconds=60 * request.minutes, seed=request.seed)
+    training = replace(TUNING, seconds=60 * request.minutes, steps=request.steps, seed=request.seed)
     before = figures_on(ready, ground, clips, request.seed)
     with _stopped_by_hand() as enough:
         found = finetune(

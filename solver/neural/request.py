@@ -23,7 +23,7 @@ class TrainRequest:
     layout : name of a layout instead, for anybody
     motions : folders of BVH and AMC files to learn from, beside made motions
     made : so many made motions of 8 s
-    minutes : that it may take
+    minutes, steps : that it may take; with steps alone to end it, the same request gives the same weights
     start : weights to begin with instead of those that ship
     resume : whether a training that was stopped goes on
     seed : of every random choice
@@ -35,6 +35,7 @@ class TrainRequest:
     motions: tuple[Path, ...] = ()
     made: int = 120
     minutes: float = 15.0
+    steps: int | None = None
     start: Path | None = None
     resume: bool = False
     seed: int = 0
@@ -47,6 +48,8 @@ class TrainRequest:
             raise InputError(f'there is no layout "{self.layout}"', "--layout", f"use {' or '.join(NAMED)}")
         if not (math.isfinite(self.minutes) and self.minutes > 0):
             raise InputError(f"{self.minutes:g} is not possible", "--minutes", "give a number above 0")
+        if self.steps is not None and self.steps < 1:
+            raise InputError(f"{self.steps} is not possible", "--steps", "give 1 or more")
         if self.made < 0 or (self.made == 0 and not self.motions):
             raise InputError("there is no motion to learn from", "--made", "give 1 or more, or --motions FOLDER")
         if self.seed < 0:
