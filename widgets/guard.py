@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import wraps
 
 from PySide6.QtCore import QRectF, Qt, QTimer
-from PySide6.QtGui import QPainter
+from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
 from widgets import theme
@@ -37,16 +38,60 @@ class PaintGuard:
             return
         finally:
             painter.end()
-        self._paint_words(said)
+        paint_words(self._widget, said)
         if said != self._told:
             self._told = said
             QTimer.singleShot(0, self._widget, lambda: self._tell(said))
 
-    def _paint_words(self, said: str) -> None:
-        look = theme.colours()
-        painter = QPainter(self._widget)
-        painter.fillRect(self._widget.rect(), theme.qcolour(look.base))
-        painter.setPen(theme.qcolour(look.error))
-        box = QRectF(self._widget.rect()).adjusted(16, 16, -16, -16)
-        painter.drawText(box, int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap), said)
-        painter.end()
+
+def guard_paints(tell: Callable[[Exception], object], package: str = "widgets.") -> None:
+    """Have every widget class of a package that is known by now paint under guard; a class is guarded once.
+
+    Parameters
+    ----------
+    tell : called with what went wrong, never while a widget is painted
+    """
+    classes: list[type[QWidget]] = [QWidget]
+    while classes:
+        kind = classes.pop()
+        classes += kind.__subclasses__()
+        paint = kind.__dict__.get("paintEvent")
+        if kind.__module__.startswith(package) and paint is not None and not hasattr(paint, "__wrapped__"):
+            kind.paintEvent = _guarded(paint, tell)  # type: ignore[method-assign]
+
+
+def end_painters(error: BaseException) -> None:
+    """End the painters of the functions that an error went through: one left open ends the program as Qt shows it."""
+    trace = error.__traceback__
+    while trace is not None:
+        for value in list(trace.tb_frame.f_locals.values()):
+            if isinstance(value, QPainter) and value.isActive():
+                value.end()
+        trace = trace.tb_next
+
+
+def paint_words(widget: QWidget, said: str) -> None:
+    """Fill a widget with a sentence on what went wrong."""
+    look = theme.colours()
+    painter = QPainter(widget)
+    painter.fillRect(widget.rect(), theme.qcolour(look.base))
+    painter.setPen(theme.qcolour(look.error))
+    box = QRectF(widget.rect()).adjusted(16, 16, -16, -16)
+    painter.drawText(box, int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap), said)
+    painter.end()
+
+
+def _guarded(
+    paint: Callable[[QWidget, QPaintEvent], None], tell: Callable[[Exception], object]
+) -> Callable[[QWidget, QPaintEvent], None]:
+    @wraps(paint)
+    def guarded(self: QWidget, event: QPaintEvent) -> None:
+        try:
+            paint(self, event)
+        except Exception as error:
+            failed = error  # the name of the clause ends with it
+            end_painters(failed)
+            paint_words(self, f"This cannot be drawn: {failed or type(failed).__name__}")
+            QTimer.singleShot(0, self, lambda: tell(failed))
+
+    return guarded

@@ -82,6 +82,7 @@ def open_window(path: Path | None = None, example: bool = False) -> int:
     from app.models.home import Home
     from app.models.workbench import Workbench
     from app.window.main import MainWindow
+    from app.window.mistakes import Mistakes
     from widgets import theme
 
     app = QApplication.instance() or QApplication(sys.argv[:1])
@@ -94,6 +95,7 @@ def open_window(path: Path | None = None, example: bool = False) -> int:
     theme.apply(app, wanted if wanted in theme.NAMES else "system", scale)
     bench = Workbench(home)
     window = MainWindow(bench)
+    Mistakes(bench).watch()
     window.show()
 
     def begin() -> None:

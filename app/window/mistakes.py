@@ -1,0 +1,47 @@
+"""Mistakes of the program itself: told in the window, and with all detail in the terminal."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from types import TracebackType
+
+from app.models.workbench import Said, Workbench
+from solver.errors import MarkerscopeError
+from widgets.guard import end_painters, guard_paints
+
+_REMEDY = "save the session; if it comes again, report it with what the terminal says"
+
+
+class Mistakes:
+    """Tells of every error that nobody expected, each once, until another one comes."""
+
+    def __init__(self, bench: Workbench) -> None:
+        self.bench = bench
+        self._told = ""
+
+    def watch(self) -> None:
+        """From now on, and whatever is painted."""
+        self._before = sys.excepthook
+        sys.excepthook = self.take
+        guard_paints(self.tell)
+
+    def take(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        """Python's hook for errors that came out of a slot or an event."""
+        end_painters(error)
+        if isinstance(error, Exception):
+            self.tell(error)
+        else:
+            self._before(kind, error, trace)
+
+    def tell(self, error: Exception) -> None:
+        """Say it."""
+        if isinstance(error, MarkerscopeError):
+            self.bench.say_error(error)
+            return
+        where = traceback.extract_tb(error.__traceback__)
+        said = f"A mistake in the program ({type(error).__name__}): {str(error).rsplit('(): ', 1)[-1]}"
+        if said != self._told:
+            self._told = said
+            traceback.print_exception(error)
+            self.bench.say(Said("error", said.rstrip(". "), where[-1].name if where else "", _REMEDY))

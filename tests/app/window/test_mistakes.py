@@ -1,0 +1,76 @@
+"""What goes wrong in the program itself is told in the window, and the window lives on."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+import pytest
+from PySide6.QtCore import QTimer
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QWidget
+
+from app.window.main import MainWindow
+from app.window.mistakes import Mistakes
+from solver.errors import InputError
+from tests.widgets.drawn import pixels
+from widgets import guard
+
+
+@pytest.fixture
+def watched(open_window: Callable[[], MainWindow], monkeypatch: pytest.MonkeyPatch) -> tuple[MainWindow, Mistakes]:
+    """A window whose mistakes are watched, until the test ends."""
+    monkeypatch.setattr(sys, "excepthook", sys.__excepthook__)
+    monkeypatch.setattr("app.window.mistakes.guard_paints", lambda tell: None)
+    window = open_window()
+    mistakes = Mistakes(window.bench)
+    mistakes.watch()
+    return window, mistakes
+
+
+def test_a_mistake_in_a_slot_is_told_once(
+    watched: tuple[MainWindow, Mistakes], spin: Callable[..., None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    window, _ = watched
+
+    def stumble() -> None:
+        raise KeyError("no such marker")
+
+    for _ in range(2):
+        QTimer.singleShot(0, window, stumble)
+        spin()
+    (message,) = window.messages.messages()
+    assert message.level == "error" and "no such marker" in message.what and message.where == "stumble"
+    assert "save the session" in message.remedy
+    assert capsys.readouterr().err.count("in stumble") == 1, "all detail is in the terminal"
+
+
+def test_what_was_expected_is_told_as_it_is(watched: tuple[MainWindow, Mistakes]) -> None:
+    window, mistakes = watched
+    mistakes.tell(InputError("jumps", "marker 3", "leave it out"))
+    (message,) = window.messages.messages()
+    assert (message.what, message.where, message.remedy) == ("jumps", "marker 3", "leave it out")
+
+
+def test_a_widget_that_fails_to_paint_says_so_and_leaves_no_painter(spin: Callable[..., None]) -> None:
+    kept: list[QPainter] = []
+
+    class Fails(QWidget):
+        def paintEvent(self, event: QPaintEvent) -> None:
+            painter = QPainter(self)
+            kept.append(painter)
+            raise ValueError("nothing to draw")
+
+    heard: list[Exception] = []
+    for _ in range(2):  # twice changes nothing
+        guard.guard_paints(heard.append, __name__)
+    widget = Fails()
+    widget.resize(300, 120)
+    widget.show()
+    drawn = pixels(widget)
+    spin()
+    assert [str(error) for error in heard][:1] == ["nothing to draw"]
+    assert drawn.std() > 3, "the sentence is to be read"
+    assert not any(painter.isActive() for painter in kept)
+    widget.close()
+    widget.deleteLater()
