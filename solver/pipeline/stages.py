@@ -105,7 +105,7 @@ GRAPH = (
     ),
     Stage(
         "orient",
-        4,
+        5,
         OrientSettings,
         (*FITTED_TO, "localize", "camera_file"),
         fitting.rank_placements,

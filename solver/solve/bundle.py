@@ -70,13 +70,13 @@ class Round:
 
 _PLACED = Phase(0.02, 0.08, 3, reassign=True, free_placement=True)
 SEARCH = (
-    Round(Phase(0.04, 0.16, 3, free_shape=False, prior=0.5), 2.8, 48),
-    Round(Phase(0.03, 0.12, 3, reassign=True, prior=0.5), 2.8, 24),
-    Round(Phase(0.025, 0.10, 3, reassign=True, prior=0.5), 2.8, 16),
-    Round(_PLACED, 1.7, 12),
-    Round(_PLACED, 1.5, 10),
-    Round(_PLACED, 1.3, 8),
-    Round(_PLACED, 1.2, 8),
+    Round(Phase(0.04, 0.16, 3, free_shape=False, prior=0.5), 2.8, 96),
+    Round(Phase(0.03, 0.12, 3, reassign=True, prior=0.5), 2.8, 48),
+    Round(Phase(0.025, 0.10, 3, reassign=True, prior=0.5), 2.8, 32),
+    Round(_PLACED, 1.7, 24),
+    Round(_PLACED, 1.5, 20),
+    Round(_PLACED, 1.3, 16),
+    Round(_PLACED, 1.2, 16),
 )
 """On few keyframes: poor starts are dropped early, more of them the clearer it is which are poor."""
 FINE = (
