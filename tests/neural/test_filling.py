@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from solver.body.model import Body
 from solver.clean.fill import fill
+from solver.clean.fill.network import fill_by_network
 from solver.clean.gap_model import draw_gaps, heavy_tailed
 from solver.clean.gaps import FillSettings
+from solver.errors import InputError
 from solver.neural import filling
 from solver.neural.examples import ExampleSettings, Sampler, body_pool, generator
+from solver.neural.fill_file import load_fill_network, save_fill_network
 from solver.neural.filling import FillNetwork, FillTask, completed, fill_bank, fill_network, new_occlusion, say, worth
 from solver.neural.layout import Layout, named_layout
 from solver.neural.library import procedural_clips
 from solver.neural.occlusion import OVERLAP, WINDOW, Occlusion, corrected, windows
 from solver.neural.train import TrainSettings, train
+from solver.neural.weights import Card
 
 torch = pytest.importorskip("torch", reason="torch is not installed here")
 
@@ -200,3 +205,21 @@ def test_a_recording_without_the_layouts_markers_is_left_to_the_default(
 ) -> None:
     used = FillNetwork(network, network.initial(0), layout, layout.rest(body))
     assert not worth(np.zeros((50, 5, 3)), 60.0, used).accepted
+
+
+def test_it_is_kept_in_a_file_and_is_a_way_of_filling_like_any_other(
+    network: Occlusion, layout: Layout, sampler: Sampler, body: Body, tmp_path: Path
+) -> None:
+    used = FillNetwork(network, network.initial(0), layout, layout.rest(body), "rigid")
+    used = replace(used, layout=replace(layout, columns=np.arange(len(layout))))
+    file = tmp_path / "fill.safetensors"
+    save_fill_network(file, used, Card("", {}, "", (), ("made",), {"ompe": 1.0}, 0, 1, 1.0))
+    again, card = load_fill_network(file, used.layout)
+    assert card.network == "occlusion" and again.start == "rigid"
+    given = sampler.draw(layout, 1, generator(0), 80).markers.numpy().astype(float)
+    given[30:40, 2] = np.nan
+    assert np.allclose(say(again, given, 60.0), say(used, given, 60.0), atol=1e-6)
+    one, other = (fill_by_network(n)(given, 60.0, FillSettings()) for n in (used, again))
+    assert np.allclose(one.positions, other.positions, atol=1e-6) and one.filled.sum() == 10
+    with pytest.raises(InputError, match="another layout"):
+        load_fill_network(file, layout.select(np.arange(5)))
