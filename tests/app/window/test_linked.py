@@ -154,6 +154,7 @@ def _rows(window: MainWindow) -> list:
 def test_the_slider_moves_the_body_and_lets_it_go(window: MainWindow, spin: Callable[..., None]) -> None:
     window.raise_dock("convergence")
     spin()
+    spin(lambda: window.scene.settled, "a scene at rest")
     fitted = picture(window.scene)
     slider = window.convergence.slider
     assert slider.maximum() > 1
@@ -169,7 +170,7 @@ def test_the_slider_moves_the_body_and_lets_it_go(window: MainWindow, spin: Call
     assert window.table.trigger("ghosts.leave")
     spin()
     assert not window.ghosts.replaces_body
-    assert changed(fitted, picture(window.scene)) < 0.002, "the fit is shown again"
+    spin(lambda: changed(fitted, picture(window.scene)) < 0.002, "the fit, as fine as it was")
 
 
 def test_the_worst_frame_of_a_marker_is_gone_to(window: MainWindow) -> None:
