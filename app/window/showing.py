@@ -114,7 +114,8 @@ class Showing:
         groups = self.window.menus.sheet()
         groups["In the scene"] = [
             ("Drag, wheel", "Orbit, zoom"), ("Right drag", "Pan"), ("Shift+drag", "Select by a box"),
-            ("Click, Ctrl+click", "Select a marker, or one more"), ("Ctrl+arrows", "Orbit"),
+            ("Click, Ctrl+click", "Select a marker, or one more"), ("Right click, Menu", "Edit its groups"),
+            ("Ctrl+arrows", "Orbit"),
             ("Ctrl+Shift+arrows", "Pan"), ("+ and -", "Zoom"), ("0", "Show everything"),
         ]  # fmt: skip
         groups["In the timelines"] = [
