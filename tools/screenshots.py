@@ -25,6 +25,8 @@ if sys.platform.startswith("linux"):
     os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
 
 if TYPE_CHECKING:
+    from PySide6.QtWidgets import QWidget
+
     from app.window.main import MainWindow
 
 Spin = Callable[..., None]
@@ -61,17 +63,20 @@ def main() -> int:
         window = MainWindow(Workbench(Home(place / "config", place / "data")))
         window.show()
         take(window, spin, options.out, "welcome")
-        session = options.session or solve(window, spin, place, options.out)
+        session = options.session or solve(window, spin, place)
         copy = place / "example.markerscope"
         if session != copy:
             open_copy(session, copy)
         window.open_path(copy)
-        spin(lambda: window.shown.get("angles") is not None and window.shown.track is not None, 1.5)
+        spin(lambda: window.bench.clock.timing.frames > 0, 1.5)
         spin(lambda: window.bench.frames is not None and window.bench.frames.done)
         window.table.trigger("run.all")
+        spin(lambda: window.bench.runner.at is not None and window.bench.runner.at.stage == "localize", 0.0)
+        take(window, spin, options.out, "running")
         spin(lambda: not window.bench.runner.running and not window.shown.stale("angles"), 1.0)
         window.messages.clear()
         pictures(window, spin, options.out)
+        dialogs(window, spin, options.out)
         theme.apply(app, "dark")
         window.redraw()
         window.raise_dock("timelines")
@@ -81,20 +86,21 @@ def main() -> int:
 
 
 def open_copy(session: Path, copy: Path) -> None:
-    """A copy that may be changed, as it looks when it is opened for the first time."""
+    """A copy that may be changed, as it looks when it is opened for the first time; the search is still to be run."""
     from solver.pipeline.session import load_session, save_session
 
-    shutil.copytree(session, copy, ignore=shutil.ignore_patterns("view.json", "journal.json"))
+    later = ("localize", "orient", "fit", "angles", "surface")
+    shutil.copytree(session, copy, ignore=shutil.ignore_patterns("view.json", "journal.json", "outputs.json"))
+    for stage in later:
+        shutil.rmtree(copy / "results" / stage, ignore_errors=True)
     save_session(replace(load_session(session), folder=copy))
 
 
-def solve(window: MainWindow, spin: Spin, place: Path, out: Path) -> Path:
+def solve(window: MainWindow, spin: Spin, place: Path) -> Path:
     """Solve the embedded recording in the window."""
     window.table.trigger("session.example")
     spin(lambda: window.bench.clock.timing.frames > 0)
     window.table.trigger("run.all")
-    spin(lambda: window.bench.runner.at is not None and window.bench.runner.at.whole > 0.2)
-    take(window, spin, out, "running")
     spin(lambda: not window.bench.runner.running)
     window.bench.document.save_as(place / "solved.markerscope")
     window.bench.close()
@@ -102,45 +108,134 @@ def solve(window: MainWindow, spin: Spin, place: Path, out: Path) -> Path:
 
 
 def pictures(window: MainWindow, spin: Spin, out: Path) -> None:
-    """The solved session, inspector by inspector."""
-    bench = window.bench
+    """The solved session, task by task."""
+    from PySide6.QtWidgets import QAbstractButton
+
+    bench, docks = window.bench, window.docks.docks
+
+    def dock(name: str, file: str, rest: float = 0.8) -> None:
+        window.raise_dock(name)
+        spin(rest=rest)
+        keep(docks[name], out / f"{file}.png")
+
     bench.clock.seek(3.2)
     window.scene.view_from("isometric")
+    window.scene.view_from("fit")
     window.scene.orbit(-0.4, -0.15)
     bench.selection.clear()
-    window.raise_dock("stages")
-    window.raise_dock("timelines")
-    window.raise_dock("affinity")
+    for name in ("stages", "timelines", "affinity"):
+        window.raise_dock(name)
     take(window, spin, out, "window")
-    bench.selection.select_markers([3, 9])
-    spin()
-    window.affinity.parentWidget().grab().save(str(out / "affinity.png"))
-    bench.selection.clear()
-    bench.display.set(colour_by="residual")
+
+    found = bench.board.current["segment"].clusters
+    chosen = [int(marker) for marker in (found == 0).nonzero()[0]]
+    bench.selection.select_markers(chosen[:2])
+    dock("affinity", "affinity")
     bench.display.show("labels", True)
+    bench.selection.select_markers(chosen)
+    spin()
+    keep(window.scene, out / "groups.png")
+    bench.selection.clear()
+    bench.display.show("labels", False)
+    bench.display.set(colour_by="residual")
     bench.display.show("trails", True)
     spin()
-    window.scene.grab().save(str(out / "scene.png"))
+    keep(window.scene, out / "scene.png")
     bench.display.set(colour_by="cluster")
-    for layer in ("labels", "trails"):
-        bench.display.show(layer, False)
+    bench.display.show("trails", False)
+
     window.raise_dock("candidates")
+    for button in window.candidates.findChildren(QAbstractButton):
+        if button.text().startswith("Scored"):
+            button.click()
     bench.selection.select(candidate=1)
-    spin()
-    window.docks.docks["candidates"].grab().save(str(out / "candidates.png"))
+    dock("candidates", "candidates")
+    keep(window.scene, out / "ghost.png")
     bench.selection.clear()
-    window.raise_dock("angles")
+    dock("hypotheses", "hypotheses", 2.5)
+    dock("markers", "markers")
+    dock("timelines", "timelines")
+    window.stages.set_open_cards(["clean"])
+    window.raise_dock("stages")
     spin()
-    window.docks.docks["angles"].grab().save(str(out / "angles.png"))
-    window.raise_dock("timelines")
+    keep(window.stages.card("clean"), out / "cleaning.png")
+    window.stages.set_open_cards([])
+    compared(window, spin, out, dock)
+
+
+def compared(window: MainWindow, spin: Spin, out: Path, dock: Callable[[str, str], None]) -> None:
+    """The fit of the first answer beside one that trusts the video more."""
+    from app.models import edits
+
+    bench = window.bench
+    first = {stage: bench.board.keys[stage] for stage in ("fit", "angles")}
+    bench.apply(edits.set_value(bench.document.session, "fit", "video_share", 4.0))
+    window.table.trigger("run.all")
+    spin(lambda: not bench.runner.running and not window.shown.stale("angles"), 1.0)
+    for stage, key in first.items():
+        bench.board.compare(stage, key, True)
+    spin(lambda: bool(window.shown.compared("fit")), 1.0)
+    dock("angles", "angles")
+    dock("timelines", "compare")
+    window.stages.set_open_cards(["fit"])
+    window.raise_dock("stages")
     spin()
-    window.docks.docks["timelines"].grab().save(str(out / "timelines.png"))
+    keep(window.stages.card("fit"), out / "results.png")
+    window.stages.set_open_cards([])
+    window.raise_dock("stages")
+
+
+def dialogs(window: MainWindow, spin: Spin, out: Path) -> None:
+    """What asks, and the search."""
+    from PySide6.QtCore import QTimer
+    from PySide6.QtWidgets import QApplication
+
+    from app.cli_commands import DEMO_MARKERS, DEMO_VIDEO
+    from app.window.importing import ask_how_to_import
+    from widgets.dialogs.export_dialog import ExportDialog
+
+    def grab(name: str) -> None:
+        def look() -> None:
+            dialog = QApplication.activeModalWidget()
+            if dialog is not None:
+                timer.stop()
+                if isinstance(dialog, ExportDialog):
+                    dialog.set_folder("exported/trial 3")
+                dialog.resize(dialog.sizeHint())
+                spin()
+                keep(dialog, out / f"{name}.png")
+                dialog.close()
+
+        timer = QTimer(window, interval=200)
+        timer.timeout.connect(look)
+        timer.start()
+
+    grab("import")
+    ask_how_to_import(window, DEMO_MARKERS, lambda: None, Path(DEMO_VIDEO.name))
+    grab("export")
+    window.asks.what_to_export()
+    window.table.trigger("help.search")
+    palette = window.asks.showing.palette  # type: ignore[attr-defined]
+    palette.line.setText("pin")
+    spin()
+    keep(palette, out / "search.png")
+    palette.hide()
 
 
 def take(window: MainWindow, spin: Spin, out: Path, name: str) -> None:
     """A picture of the whole window, once it is at rest."""
     spin()
-    window.grab().save(str(out / f"{name}.png"))
+    keep(window, out / f"{name}.png")
+
+
+def keep(widget: QWidget, path: Path) -> None:
+    """Write what a widget shows, packed as well as PNG can."""
+    from PySide6.QtGui import QImage, QImageWriter
+
+    writer = QImageWriter(str(path), b"png")
+    writer.setCompression(100)
+    if not writer.write(widget.grab().toImage().convertToFormat(QImage.Format.Format_RGB888)):
+        raise SystemExit(f"{path} cannot be written: {writer.errorString()}")
 
 
 if __name__ == "__main__":

@@ -131,7 +131,7 @@ class ExportDialog(QDialog):
         """All formats where the screen allows."""
         line = self.fontMetrics().height()
         tall = self._column.totalHeightForWidth(36 * line)
-        return QSize(40 * line, min(max(tall, self._inner.sizeHint().height()) + 12 * line, 56 * line))
+        return QSize(40 * line, min(tall + 10 * line, 56 * line))
 
     def _say(self) -> None:
         files = list(dict.fromkeys(name for entry in self.chosen() for name in self._formats[entry].files))

@@ -193,6 +193,7 @@ class HypothesesView(QWidget):
         inner = QWidget()
         inner.setLayout(self._row)
         self._scroll = QScrollArea()
+        self._scroll.setAccessibleName("Answers side by side")
         self._scroll.setWidgetResizable(True)
         self._scroll.setFrameShape(QFrame.Shape.NoFrame)
         self._scroll.setWidget(inner)

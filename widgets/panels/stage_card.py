@@ -230,6 +230,7 @@ class StageCard(QFrame):
             f"{result.settings}\n{', '.join(part for part in (result.headline, result.when) if part)}".strip()
         )
         text.setWordWrap(True)
+        text.setMinimumHeight(text.heightForWidth(max(self.width() - 9 * self.fontMetrics().height(), 60)))
         use: QWidget
         if result.current:
             use = QLabel("in force")

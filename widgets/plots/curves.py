@@ -105,6 +105,7 @@ class CurvesView(QWidget):
         self._title.setWordWrap(True)
         self._title.setForegroundRole(QPalette.ColorRole.PlaceholderText)
         scroll = QScrollArea()
+        scroll.setAccessibleName("Curves of the joint angles")
         scroll.setWidget(self.plots)
         scroll.setWidgetResizable(True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
