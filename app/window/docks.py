@@ -110,6 +110,7 @@ class Docks:
                 dock.setTitleBarWidget(None)  # type: ignore[arg-type]  # Qt's own again
                 bare.deleteLater()
         for bar in self.window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly):
+            bar.setElideMode(Qt.TextElideMode.ElideNone)  # arrows lead to tabs that have no room
             if bar.contextMenuPolicy() != Qt.ContextMenuPolicy.CustomContextMenu:
                 bar.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
                 bar.customContextMenuRequested.connect(lambda at, bar=bar: self._menu(bar, at))

@@ -9,7 +9,7 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
@@ -187,10 +187,7 @@ class Scene3D(Contents):
                 self._quick()
             assert self._picture is not None
             painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-            if self._picture.size() == self.size() * self.devicePixelRatioF():
-                painter.drawImage(QPointF(0, 0), self._picture)
-            else:
-                painter.drawImage(QRectF(self.rect()), self._picture)
+            painter.drawImage(QRectF(self.rect()), self._picture)  # however fine its pixels are
         else:
             painter.fillRect(self.rect(), theme.qcolour(theme.colours().scene_bottom))
         self._sheet.paint(painter, self._stage, self._camera, (self.width(), self.height()), self._navigator.band)
