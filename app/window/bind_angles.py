@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from PySide6.QtCore import QTimer
 
 from app.actions import Actions
 from app.actions.run_actions import run_stage
@@ -21,6 +22,8 @@ class AnglesBinder:
 
     def __init__(self, widget: CurvesView, bench: Workbench, shown: Shown, table: Actions) -> None:
         self.widget, self.bench, self.shown = widget, bench, shown
+        self._filling = QTimer(widget, singleShot=True, interval=0)  # after the scene, so that neither waits for both
+        self._filling.timeout.connect(self._fill)
         shown.changed.connect(self._changed)
         bench.opened.connect(self._opened)
         bench.document.changed.connect(lambda another: self._conventions())
@@ -37,7 +40,11 @@ class AnglesBinder:
             self.widget.set_curves(np.zeros(0), ())
 
     def _changed(self, stages: frozenset[str]) -> None:
-        if not stages & {"angles", "fit", "compared"}:
+        if stages & {"angles", "fit", "compared"}:
+            self._filling.start()
+
+    def _fill(self) -> None:
+        if not self.bench.document.is_open:
             return
         angles, motion = self.shown.get("angles"), self.shown.get("fit")
         self._conventions()
