@@ -13,10 +13,10 @@ from solver.bench.methods import PAPER_CODE, Given, Solved, Variant, bundle, out
 from solver.body.model import Body
 from solver.markers import Markers
 from solver.progress import Progress, silent
-from solver.solve.method import LocalizeSettings, OrientSettings
 from solver.solve.paper.results import BodyState
 from solver.solve.paper.settings import PaperLocalizeSettings, PaperSolveSettings
 from solver.solve.results import CameraResult, FittedMotion
+from solver.solve.settings import LocalizeSettings, OrientSettings
 from solver.solve.state import Observations, Weights
 
 _OFFSET = 0.0095

@@ -11,8 +11,8 @@ from solver.pipeline.cleaning import measured
 from solver.pipeline.stage import NoSettings
 from solver.progress import Progress
 from solver.segment import Segmentation, SegmentSettings
-from solver.solve.method import FitSettings, LocalizeSettings, OrientSettings
 from solver.solve.results import CameraResult, FittedMotion, Localization, Orientation
+from solver.solve.settings import FitSettings, LocalizeSettings, OrientSettings
 from solver.surface import SurfaceDistance
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from solver.pipeline.inputs import LandmarkSettings, MarkerSettings, PriorSettin
 from solver.pipeline.stage import NoSettings, Stage
 from solver.prior import PosePrior
 from solver.segment import Segmentation, SegmentSettings
-from solver.solve.method import FitSettings, LocalizeSettings, OrientSettings
 from solver.solve.results import FittedMotion, Localization, Orientation
+from solver.solve.settings import FitSettings, LocalizeSettings, OrientSettings
 from solver.surface import SurfaceDistance
 from solver.sync import Sync
 from solver.video.landmarks import Landmarks

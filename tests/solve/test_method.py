@@ -11,8 +11,9 @@ from solver.body.model import Body
 from solver.body.skeleton import JOINTS
 from solver.errors import InputError
 from solver.progress import silent
-from solver.solve.method import FitSettings, LocalizeSettings, OrientSettings, fit, localize, orient
+from solver.solve.method import fit, localize, orient
 from solver.solve.results import CameraResult, FittedMotion, Orientation
+from solver.solve.settings import FitSettings, LocalizeSettings, OrientSettings
 from tests.solve.conftest import Scene, simulate
 
 QUICK = LocalizeSettings(yaws=8, few=8, many=16, keep=10)

@@ -16,8 +16,8 @@ from solver.body.model import Body
 from solver.pipeline.stages import GRAPH, SOURCES
 from solver.progress import Found
 from solver.rotations import exp_so3
-from solver.solve.method import OrientSettings
 from solver.solve.results import Orientation
+from solver.solve.settings import OrientSettings
 
 
 class Listener:
