@@ -7,41 +7,48 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.body.model import Body
-from solver.neural.agnostic_solve import Marked, Solved, completed
+from solver.errors import InputError
+from solver.neural.agnostic_solve import Marked
 from solver.progress import Progress, silent
 from solver.solve.bundle import FINE, descend
 from solver.solve.kinematics import Points, Pose
-from solver.solve.method import FitSettings, chosen_row, fitted_motion, state_of
+from solver.solve.method import chosen_row, fitted_motion, state_of
 from solver.solve.problem import Problem
 from solver.solve.refine import every_frame, set_on_markers
 from solver.solve.results import Candidate, FittedMotion, Localization, Orientation
-from solver.solve.state import Observations, State, Weights
+from solver.solve.settings import FitSettings
+from solver.solve.state import FREE, Observations, State, Weights
+
+_LEAST_DEG = 1.0
 
 
 @dataclass(frozen=True)
 class NetworkPoses:
-    """What the network says of every frame, and of which of it markers tell.
+    """What the network says of every frame, put together with what is known without it.
 
     Attributes
     ----------
     chosen : row of the candidate whose places of the markers it was told
-    rotations : (T, 24, 3, 3) lab frame; bones that no marker tells of as the video has them
+    rotations : (T, 24, 3, 3) lab frame, the network's and the default fit's by how far each can be trusted
     trans : (T, 3) m
-    known : (24,) True for bones that markers tell of
+    share : (24,) how much of each joint is the network's, 0..1
+    spread_deg : (24,) degrees, how far each joint is expected to be off
     seen : (T,) False where fewer than 3 markers are seen
-    gap : m, median distance of the markers from where these poses put them
+    gap : m, median distance of the markers from where the network's own poses put them
     weights : which weights, in words
-    tuned : steps of training on this session's layout
+    tuned, default_deg : with which settings
     """
 
     chosen: int
     rotations: np.ndarray
     trans: np.ndarray
-    known: np.ndarray
+    share: np.ndarray
+    spread_deg: np.ndarray
     seen: np.ndarray
     gap: float
     weights: str
     tuned: int
+    default_deg: float
 
 
 @dataclass(frozen=True)
@@ -50,38 +57,24 @@ class NeuralFitSettings(FitSettings):
 
     Attributes
     ----------
-    network_deg : degrees, spread of the network's joint rotations: what markers say more surely counts more
-    settle : whether shape and places of the markers are solved once more, held by the network's poses instead of the
-        video's
+    looseness : times the expected error that the poses may give way to the markers
+    settle : whether shape and places of the markers are solved once more, held by these poses instead of the video's
     """
 
-    network_deg: float = 8.0
+    looseness: float = 1.0
     settle: bool = True
 
     def __post_init__(self) -> None:
         """Refuse what cannot work."""
         super().__post_init__()
-        FitSettings(video_share=self.network_deg)
+        if not (np.isfinite(self.looseness) and self.looseness > 0):
+            raise InputError(f"{self.looseness} is not possible", "the setting looseness", "give a number above 0")
 
 
 def marked(body: Body, chosen: Candidate) -> Marked:
     """What a network is told of a candidate: where its markers sit."""
     points = Points(chosen.rest, chosen.dirs, chosen.weights)
     return Marked(points.shaped(chosen.betas), points.weights, body.joints(chosen.betas))
-
-
-def with_video(body: Body, seen: Observations, chosen: Candidate, solved: Solved, known: np.ndarray) -> Pose:
-    """The network's poses; bones that no marker tells of as the video has them; set on the markers.
-
-    Parameters
-    ----------
-    seen : all T frames, the used markers
-    known : (24,) True for bones that markers tell of
-    """
-    video = seen.prior.copy()
-    video[:, 0] = chosen.camera.R_lab_cam @ video[:, 0]
-    pose = Pose(completed(solved, known, video), solved.trans, chosen.betas)
-    return set_on_markers(body, seen, Points(chosen.rest, chosen.dirs, chosen.weights), pose)
 
 
 def fit_from_network(
@@ -110,7 +103,7 @@ def fit_from_network(
     # The network knows nothing of a bias: what the video had of it does not belong to these poses.
     state = State(state.pose, state.placement, state.camera)
     given = replace(used, prior=usual, tracked=poses.seen)
-    weights = _weights(settings)
+    weights = _weights(settings, poses.spread_deg)
     if settings.settle:
         problem = Problem(body, given.at(frames), landmarks)
         state, surface, _ = descend(problem, state, surface, FINE[-1:], weights)
@@ -119,12 +112,13 @@ def fit_from_network(
     return fitted_motion(body, seen, found, ranked, settings, state, pose, time)
 
 
-def _weights(settings: NeuralFitSettings) -> Weights:
-    """The camera is held: the network's root was brought into its frame."""
+def _weights(settings: NeuralFitSettings, spread_deg: np.ndarray) -> Weights:
+    """Every joint held as tightly as it is known; the camera stays, the root was brought into its frame."""
+    spread = np.maximum(settings.looseness * spread_deg[FREE], _LEAST_DEG)
     return replace(
         settings.weights(),
-        prior_deg=settings.network_deg,
-        root_deg=settings.network_deg,
+        prior_deg=spread,
+        root_deg=float(spread[0]),
         anatomical=0.03,
         free_bias=False,
         free_camera=False,

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from resources import resource
-from solver.body.skeleton import JOINTS, PARENTS, descendants
+from solver.body.skeleton import JOINTS
 from solver.errors import InputError
 from solver.neural.weights import Card, load_weights
 from solver.progress import Progress, silent
@@ -23,8 +22,6 @@ NETWORK = "agnostic"
 """The network's name on cards."""
 SHIPPED = resource("neural", "agnostic.safetensors")
 _AT_ONCE = 512
-_ENOUGH = 0.3
-"""Of a marker, so much on a bone tells of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,21 +38,6 @@ class Marked:
     rest: np.ndarray
     weights: np.ndarray
     joints: np.ndarray
-
-    def take(self, index: np.ndarray) -> Marked:
-        """Some of the markers."""
-        return Marked(self.rest[index], self.weights[index], self.joints)
-
-    @cached_property
-    def own(self) -> np.ndarray:
-        """(24,) how many markers each bone carries."""
-        return np.asarray(self.weights.sum(axis=0))
-
-    @property
-    def turned(self) -> np.ndarray:
-        """(24,) True for bones whose rotation in the lab the markers tell: they carry some, or lie between two such."""
-        below = descendants() @ self.own
-        return (self.own > _ENOUGH) | ((below > _ENOUGH) & (self.own.sum() - below > _ENOUGH))
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,25 +153,3 @@ def _held(solved: Solved) -> Solved:
     for k in range(3):
         trans[lost, k] = np.interp(frames[lost], frames[known], solved.trans[known, k])
     return Solved(rotations, trans, solved.seen)
-
-
-def completed(solved: Solved, known: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """(T, 24, 3, 3): the network's rotation of each bone in the lab where markers tell it, else another pose's joint.
-
-    Parameters
-    ----------
-    known : (24,) True where the network counts
-    other : (T, 24, 3, 3) poses from elsewhere, the root in the lab
-    """
-    if known.all():
-        return solved.rotations
-    world, mine = np.empty_like(solved.rotations), np.empty_like(solved.rotations)
-    for j in range(len(JOINTS)):
-        parent = int(PARENTS[j])
-        own = solved.rotations[:, j]
-        mine[:, j] = own if parent < 0 else mine[:, parent] @ own
-        elsewhere = other[:, j] if parent < 0 else world[:, parent] @ other[:, j]
-        world[:, j] = mine[:, j] if known[j] else elsewhere
-    local = world.copy()
-    local[:, 1:] = np.swapaxes(world[:, PARENTS[1:]], -1, -2) @ world[:, 1:]
-    return local

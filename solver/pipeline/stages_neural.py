@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,21 +27,26 @@ class NetworkSettings:
 
     Attributes
     ----------
-    tune_steps : steps of training on this session's own layout and body before it solves, on made motions; 300 take
+    tune_steps : steps of training on this session's own markers and body before it solves, on made motions; 300 take
         about a minute
+    default_deg : degrees, spread of the default fit's joint rotations, beside which the network's count by what it gets
+        wrong with these markers on made motions
     """
 
     tune_steps: int = 0
+    default_deg: float = 5.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot work."""
         if self.tune_steps < 0:
             raise InputError(f"{self.tune_steps} is not possible", "the setting tune_steps", "give 0 or more")
+        if not (np.isfinite(self.default_deg) and self.default_deg > 0):
+            raise InputError(f"{self.default_deg} is not possible", "the setting default_deg", "give a number above 0")
 
 
 def ask_network(given: Mapping[str, Any], settings: NetworkSettings, progress: Progress) -> NetworkPoses:
     """A network reads the poses off the markers, told where on the body they sit."""
-    return _poses(given, settings.tune_steps, 0, progress)
+    return _poses(given, settings, 0, progress)
 
 
 def fit_from_poses(given: Mapping[str, Any], settings: NeuralFitSettings, progress: Progress) -> FittedMotion:
@@ -53,43 +58,58 @@ def fit_from_poses(given: Mapping[str, Any], settings: NeuralFitSettings, progre
     poses: NetworkPoses = given["network"]
     row = chosen_row(given["orient"], settings)
     if row != poses.chosen:
-        poses = _poses(given, poses.tuned, row, part_of(progress, 0.0, 0.5))
+        poses = _poses(given, NetworkSettings(poses.tuned, poses.default_deg), row, part_of(progress, 0.0, 0.5))
     time = given["clean"].markers.time
     return fit_from_network(body, seen, points, given["localize"], given["orient"], poses, time, settings, progress)
 
 
-def _poses(given: Mapping[str, Any], tune_steps: int, row: int, progress: Progress) -> NetworkPoses:
-    """The network's poses with the markers where a candidate has them."""
+def _poses(given: Mapping[str, Any], settings: NetworkSettings, row: int, progress: Progress) -> NetworkPoses:
+    """The network's poses with the markers where a candidate has them, beside the default fit of that candidate."""
     from solver.neural import agnostic_solve
-    from solver.neural.agnostic_fit import marked, with_video
+    from solver.neural.agnostic_fit import marked
+    from solver.neural.agnostic_trust import blended, expected_errors
     from solver.neural.places import check_places
-    from solver.solve.kinematics import Points, forward, place_points
+    from solver.solve.kinematics import Points, Pose, forward, place_points
+    from solver.solve.method import fit
+    from solver.solve.settings import FitSettings
 
     path: Path | None = given["weights_file"]
-    body, seen, _ = scene_of(given)
-    found, chosen = given["localize"], given["orient"].candidates[row]
+    body, seen, landmarks = scene_of(given)
+    found, ranked, time = given["localize"], given["orient"], given["clean"].markers.time
+    chosen = ranked.candidates[row]
     ready = agnostic_solve.load(path)
-    card = ready.card
-    check_places(card, body, chosen.vertex, path)
+    check_places(ready.card, body, chosen.vertex, path)
     there = marked(body, chosen)
-    if tune_steps:
+    if settings.tune_steps:
         from solver.neural.finetune import Ground, tuned
 
-        ready = tuned(ready, Ground(body, person=there), tune_steps, part_of(progress, 0.0, 0.9))
-    used = replace(seen, markers=seen.markers[:, found.markers])
-    solved = agnostic_solve.solve_frames(ready, used.markers, there, progress)
-    pose = with_video(body, used, chosen, solved, there.turned)
-    points = Points(chosen.rest, chosen.dirs, chosen.weights)
-    placed = place_points(points, forward(body, pose), pose.betas)
-    gap = float(np.nanmedian(np.linalg.norm(placed - used.markers, axis=2)))
-    which = f"{'shipped' if path is None else path.name}, {card.steps} steps, {card.date[:10]}"
-    return NetworkPoses(row, pose.rotations, pose.trans, there.turned, solved.seen, gap, which, tune_steps)
+        ready = tuned(ready, Ground(body, person=there), settings.tune_steps, part_of(progress, 0.0, 0.8))
+    usual = fit(body, seen, landmarks, found, ranked, time, FitSettings(row), part_of(progress, 0.8, 0.9))
+    markers = seen.markers[:, found.markers]
+    solved = agnostic_solve.solve_frames(ready, markers, there, part_of(progress, 0.9, 1.0))
+    blend = blended(solved.rotations, usual.rotations, expected_errors(ready, body, there), settings.default_deg)
+    own = Pose(solved.rotations, solved.trans, chosen.betas)
+    placed = place_points(Points(chosen.rest, chosen.dirs, chosen.weights), forward(body, own), own.betas)
+    return NetworkPoses(
+        chosen=row,
+        rotations=blend.rotations,
+        trans=usual.trans,
+        share=blend.share,
+        spread_deg=blend.spread_deg,
+        seen=solved.seen,
+        gap=float(np.nanmedian(np.linalg.norm(placed - markers, axis=2))),
+        weights=f"{'shipped' if path is None else path.name}, {ready.card.steps} steps, {ready.card.date[:10]}",
+        tuned=settings.tune_steps,
+        default_deg=settings.default_deg,
+    )
 
 
 def said_poses(poses: NetworkPoses) -> str:
-    """How near it came, and by which weights."""
-    told = "every bone" if poses.known.all() else f"{poses.known.sum()} of {len(poses.known)} bones"
-    return f"markers {1000 * poses.gap:.1f} mm from the network's poses (median), of {told}; weights: {poses.weights}"
+    """How near it came, how much it counts, and by which weights."""
+    return (
+        f"markers {1000 * poses.gap:.1f} mm from the network's own poses (median); it counts {poses.share.mean():.2f} "
+        f"beside the default fit; weights: {poses.weights}"
+    )
 
 
 _OWN = (

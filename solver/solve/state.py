@@ -106,7 +106,7 @@ class Weights:
     ----------
     marker : m, spread of a marker about its place on the skin
     marker_kernel : m, beyond this a marker counts as an outlier (Geman-McClure)
-    prior_deg : spread of the video's joint rotations about their bias
+    prior_deg : spread of the video's joint rotations about their bias; one, or (K,) of each joint
     bias_deg : spread of that bias, which a reconstruction from one camera keeps from frame to frame
     root_deg : spread of the video's root rotation, once the camera is turned right
     anatomical : share of the anatomical prior
@@ -122,7 +122,7 @@ class Weights:
 
     marker: float = 0.01
     marker_kernel: float = 0.03
-    prior_deg: float = 18.0
+    prior_deg: float | np.ndarray = 18.0
     bias_deg: float = 15.0
     root_deg: float = 25.0
     anatomical: float = 0.3

@@ -38,7 +38,7 @@ def trusted(seen: Observations, state: State, weights: Weights) -> Weights:
     return replace(
         weights,
         bias_deg=_blended(weights.bias_deg, bias),
-        prior_deg=_blended(weights.prior_deg, np.sqrt((wander**2).mean(axis=0))),
+        prior_deg=_blended(float(np.mean(weights.prior_deg)), np.sqrt((wander**2).mean(axis=0))),
     )
 
 

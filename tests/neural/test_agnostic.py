@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from solver.body.model import Body, chain
+from solver.body.skeleton import INDEX
 from solver.neural import agnostic_solve
 from solver.neural.agnostic import Agnostic, AgnosticSettings, Frames
 from solver.neural.agnostic_align import align_to_rest
 from solver.neural.agnostic_examples import CLEAN, Spoiling, Task, any_layout, told
 from solver.neural.agnostic_layouts import Skin
-from solver.neural.agnostic_solve import Marked, Ready, completed, solve_frames
+from solver.neural.agnostic_solve import Marked, Ready, solve_frames
+from solver.neural.agnostic_trust import blended, expected_errors
 from solver.neural.examples import ExampleSettings, Sampler, body_pool, generator
 from solver.neural.library import procedural_clips
 from solver.neural.pretrain import judged_on, objective
@@ -162,16 +164,29 @@ def test_one_batch_is_learnt_by_heart(draw: Callable[..., Task]) -> None:
     assert after["joe_deg"] < 0.35 * before["joe_deg"] and after["jpe_cm"] < 0.25 * before["jpe_cm"], (before, after)
 
 
-def test_bones_without_markers_are_as_the_other_pose_has_them() -> None:
+def test_two_poses_are_put_together_by_how_far_each_can_be_trusted() -> None:
     rng = np.random.default_rng(9)
-    mine, other = (exp_so3(0.4 * rng.normal(size=(3, 24, 3))) for _ in range(2))
-    known = np.zeros(24, dtype=bool)
-    known[[1, 4, 7]] = True  # a leg
-    solved = agnostic_solve.Solved(mine, np.zeros((3, 3)), np.ones(3, dtype=bool))
-    found = completed(solved, known, other)
-    rest = np.zeros((24, 3))
-    worlds = [chain(rotations, rest, np.zeros((3, 3)))[0] for rotations in (mine, other, found)]
-    assert np.allclose(worlds[2][:, [1, 4, 7]], worlds[0][:, [1, 4, 7]])
-    assert np.allclose(worlds[2][:, [0, 2, 3, 5]], worlds[1][:, [0, 2, 3, 5]])
-    assert np.allclose(found[:, 10], other[:, 10])
-    assert completed(solved, np.ones(24, dtype=bool), other) is mine
+    other = exp_so3(0.4 * rng.normal(size=(3, 24, 3)))
+    apart = 0.2 * rng.normal(size=(3, 24, 3))
+    network = other @ exp_so3(apart)
+    errors = np.zeros((24, 3, 3))
+    errors[1] = np.eye(3) * 1e6  # knows nothing
+    errors[2] = np.diag([0, 1e6, np.radians(4) ** 2])  # its first axis surely, its second not at all, its third as well
+    found = blended(network, other, errors, 4.0)
+    assert np.allclose(found.rotations[:, 0], network[:, 0]) and np.isclose(found.share[0], 1)
+    assert np.allclose(found.rotations[:, 1], other[:, 1], atol=1e-6) and found.share[1] < 1e-6
+    wanted = other[:, 2] @ exp_so3(apart[:, 2] * [1, 0, 0.5])
+    assert np.allclose(found.rotations[:, 2], wanted, atol=1e-6)
+    assert np.isclose(found.spread_deg[1], 4.0, atol=1e-3) and found.spread_deg[0] < 1e-6
+
+
+def test_what_no_marker_tells_of_is_known_to_be_uncertain(body: Body, skin: Skin) -> None:
+    arm = np.isin(skin.owner, [INDEX["right_elbow"], INDEX["right_wrist"], INDEX["right_hand"]])
+    there = np.flatnonzero(~arm)
+    vertex = skin.vertex[there[np.linspace(0, len(there) - 1, 60).astype(int)]]
+    plain = np.zeros(body.shape_count)
+    skin_at = body.surface(plain)[vertex] + 0.0095 * body.normals(plain)[vertex]
+    person = Marked(skin_at, body.weights[vertex], body.joints(plain))
+    errors = np.sqrt(np.trace(expected_errors(agnostic_solve.load(), body, person), axis1=1, axis2=2))
+    left, right = errors[INDEX["left_elbow"]], errors[INDEX["right_elbow"]]
+    assert right > 2 * left, np.degrees([left, right])
