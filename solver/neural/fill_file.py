@@ -19,7 +19,7 @@ def save_fill_network(path: str | Path, found: FillNetwork, card: Card) -> Card:
     config = {
         "network": found.network.config(),
         "layout": found.layout.plain(),
-        "rest": np.round(found.rest, 6).tolist(),
+        "rest": found.rest.tolist(),
         "start": found.start,
     }
     own = {"network": found.network.kind, "config": config, "layout": found.layout.digest}

