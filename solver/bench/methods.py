@@ -30,6 +30,7 @@ _UNSURE = 0.5
 SHARED_CODE = ("body", "clean", "markers.py", "prior.py", "prior_fill.py", "rotations.py", "sync.py", "video/shadow.py",
            "video/lift.py", "segment.py", "affinity.py", "localize.py", "solve/*.py", "pipeline/fitting.py",
            "pipeline/stages.py", "pipeline/inputs.py", "pipeline/cleaning.py")  # fmt: skip
+NEURAL_CODE = (*SHARED_CODE, "neural", "pipeline/stages_neural.py")
 PAPER_CODE = (*SHARED_CODE, "solve/paper", "pipeline/stages_paper.py")
 
 
@@ -145,6 +146,11 @@ def paper(given: Given, settings: Mapping[str, Any], progress: Progress = silent
     return outcome("paper", *run_stages("paper", given, settings, "fit", progress))
 
 
+def neural(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
+    """The network's poses beside the default fit, refined."""
+    return outcome("neural", *run_stages("neural", given, settings, "fit", progress))
+
+
 def registration(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
     """The video's pose, set rigidly on the markers: the paper's baseline."""
     from solver.pipeline.fitting import scene
@@ -184,6 +190,7 @@ def run_stages(
         "landmarks": None,
         "body_file": given.body,
         "camera_file": None,
+        "weights_file": None,
     }
     seconds: dict[str, float] = {}
 
@@ -222,7 +229,7 @@ def outcome(name: Method, results: Mapping[str, Any], seconds: Mapping[str, floa
 
     ranked: Orientation = results["orient"]
     found, motion, sync = results["localize"], results["fit"], results["sync"]
-    frames = found.many if name == "bundle" else found.frames
+    frames = found.frames if name == "paper" else found.many
     body = scene(results)[0]
     alternatives = []
     for candidate in ranked.candidates:
@@ -257,6 +264,7 @@ METHODS = (
         {"localize": PaperLocalizeSettings(), "solve": PaperSolveSettings()},
         PAPER_CODE,
     ),
+    Variant("neural", "a trained network beside the default fit, then refined", neural, sources=NEURAL_CODE),
     Variant(
         "registration",
         "the video's pose set rigidly on the markers (HMR2.0+RR of the paper)",
