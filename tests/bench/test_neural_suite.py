@@ -63,6 +63,6 @@ def test_an_answer_is_judged_by_the_truth() -> None:
     exam = recordings(body, new_layout(body, 1), procedural_clips(2, 1), 2, 7)
     right = examined(lambda recording: (recording.rotations, recording.joints), exam)
     assert right.joe_deg < 1e-6 and right.jpe_cm < 1e-6
-    off = examined(lambda recording: (recording.rotations, recording.joints + [0.03, 0, 0.04]), exam)
+    off = examined(lambda recording: (recording.rotations, recording.joints + np.array([0.03, 0, 0.04])), exam)
     assert np.isclose(off.jpe_cm, 5.0), off
     assert all(len(recording.told.rest) == 40 for recording in exam)

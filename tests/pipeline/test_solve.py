@@ -75,7 +75,7 @@ def edited(folder: Path, edits: Mapping[str, Mapping[str, Any]]) -> SolveRequest
     ("stage", "name", "value", "changed"),
     [
         ("markers", "start", 0.5, {"markers", "clean", "segment", "sync"} | FITTED),
-        ("clean", "ratio", 9.0, {"clean", "segment", "sync"} | FITTED),
+        ("clean", "ratio", 12.0, {"clean", "segment", "sync"} | FITTED),
         ("landmarks", "rate", 15.0, {"landmarks", "prior", "sync"} | FITTED),
         ("prior", "rate", 25.0, {"prior", "sync"} | FITTED),
         ("sync", "offset", 0.2, {"sync"} | FITTED),
@@ -102,6 +102,7 @@ def test_a_setting_changes_what_depends_on_it(stage: str, name: str, value: Any,
         ("prior_file", {"prior", "sync"} | FITTED),
         ("camera_file", FITTED),
         ("body_file", FITTED),
+        ("weights_file", set()),
     ],
 )
 def test_an_input_changes_what_depends_on_it(source: str, changed: set[str]) -> None:
