@@ -14,7 +14,7 @@ from solver.clean.gaps import Fill, Filled, FillSettings, gaps_to_fill, together
 from solver.clean.request import Method
 from solver.neural.align import align, into, out_of
 from solver.neural.examples import Sampler, generator
-from solver.neural.layers import Params
+from solver.neural.layers import Params, spread_of
 from solver.neural.layout import Layout
 from solver.neural.library import RATE
 from solver.neural.metrics import ompe
@@ -277,4 +277,4 @@ def new_occlusion(
     local, _, _ = align(markers, layout, torch.as_tensor(rest, dtype=torch.float32))
     mean = np.round(local.mean(0).numpy().astype(float), 5).tolist()
     links = nearest(distance_deviation(markers.numpy()), FILLING)
-    return Occlusion(links, mean, hidden=hidden, filled_first=filled_first)
+    return Occlusion(links, mean, spread_of(local, links), hidden=hidden, filled_first=filled_first)

@@ -21,6 +21,7 @@ from solver.neural.layers import (
     new_bias,
     new_dense,
     per_node,
+    relative,
     residual,
 )
 
@@ -194,7 +195,7 @@ class Heterogeneous:
         import torch
 
         mean_markers, mean_rotations, mean_offsets = self._means
-        features = torch.cat([(markers - mean_markers) / SCALE_M, visible[..., None].to(markers.dtype)], -1)
+        features = torch.cat([markers - mean_markers, visible[..., None].to(markers.dtype)], -1)
         on_markers = self._marker_features(params, features)
         wide = dense(params, "wide", flat(on_markers)).relu()
         wide = residual(params, [f"wide{k}" for k in range(self.sizes.deep)], wide)
@@ -214,30 +215,15 @@ class Heterogeneous:
     def _marker_features(self, params: Params, features: Tensor) -> Tensor:
         """(M, B, C)."""
         if not self.sizes.marker_convolution:
-            x = dense(params, "marker", features.flatten(1)).relu()
+            sized = features / features.new_tensor([SCALE_M, SCALE_M, SCALE_M, 1.0])
+            x = dense(params, "marker", sized.flatten(1)).relu()
             x = residual(params, [f"marker{k}" for k in range(len(self.sizes.markers) - 1)], x)
             return per_node(x, self.graph.markers)
-        x = self._first(params, first_nodes(features))
+        x = relative(self._on_markers[0], params, "marker0", first_nodes(features), self.spread)
+        x = leaky(x + params["marker0.b"])
         for k, layer in enumerate(self._on_markers[1:], start=1):
             x = leaky(layer(params, f"marker{k}", x) + params[f"marker{k}.b"])
         return x
-
-    def _first(self, params: Params, x: Tensor) -> Tensor:
-        """The first convolution on markers: neighbours as seen from the marker, every edge's input of size one.
-
-        A sum over neighbours of filtered places is the same sum of filtered differences with another filter for the
-        marker itself, so this is equation (4) as it stands. But millimetres between the markers of a wrist tell how it
-        is turned, and half a metre does not where they are: with filters on places that is learnt slowly.
-        """
-        import torch
-
-        layer = self._on_markers[0]
-        heard = layer.heard(x)  # (M, K, B, 4)
-        places = SCALE_M * heard[..., :3]
-        apart = torch.cat([places[:, :1], places[:, 1:] - places[:, :1]], 1)
-        sized = apart / torch.tensor(self.spread, dtype=x.dtype)[:, :, None, None]
-        heard = torch.cat([sized, heard[..., 3:]], -1)
-        return leaky(layer.filtered(params, "marker0", heard) + params["marker0.b"])
 
     def _linked(self, params: Params, on_markers: Tensor) -> tuple[Tensor, Tensor]:
         """Features of joints (J, B, C) and of the whole (B, C), after the markers and joints heard each other."""

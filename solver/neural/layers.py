@@ -93,6 +93,37 @@ class EdgeConvolution:
         return heard.transpose(1, 2).flatten(2) @ (params[f"{name}.w"] * self._slots[1])
 
 
+def relative(layer: EdgeConvolution, params: Params, name: str, x: Tensor, spread: Sequence[Sequence[float]]) -> Tensor:
+    """A convolution on places, with neighbours as seen from the marker and every edge's input of size one.
+
+    A sum over neighbours of filtered places is the same sum of filtered differences with another filter for the marker
+    itself, so this is equation (4) as it stands. But millimetres between the markers of a wrist tell how it is turned,
+    and half a metre does not where they are: with filters on places that is learnt slowly.
+
+    Parameters
+    ----------
+    layer : each marker hears itself first
+    x : (M, B, 4), place (m) and whether it was seen
+    spread : (M, K) m, how much the marker's place varies, and then what it hears, seen from it
+    """
+    import torch
+
+    heard = layer.heard(x)  # (M, K, B, 4)
+    places = heard[..., :3]
+    apart = torch.cat([places[:, :1], places[:, 1:] - places[:, :1]], 1)
+    sized = apart / torch.tensor(spread, dtype=x.dtype)[:, :, None, None]
+    return layer.filtered(params, name, torch.cat([sized, heard[..., 3:]], -1))
+
+
+def spread_of(local: Tensor, links: Links) -> list[list[float]]:
+    """(M, K) m, as ``relative`` takes it, of markers (B, M, 3) m: root mean squares along an axis, at least 5 mm."""
+    rows = []
+    for m, row in enumerate(links):
+        apart = [local[:, m], *(local[:, k] - local[:, m] for k in row[1:])]
+        rows.append([round(float(p.std(0).square().mean().sqrt().clamp_min(0.005)), 4) for p in apart])
+    return rows
+
+
 def new_bias(params: Params, name: str, nodes: int, outputs: int) -> None:
     """Add a bias for each node."""
     import torch

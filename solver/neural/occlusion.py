@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.neural.examples import generator as new_generator
-from solver.neural.heterogeneous import SCALE_M
-from solver.neural.layers import EdgeConvolution, Params, dense, leaky, new_bias, new_dense
+from solver.neural.layers import EdgeConvolution, Params, dense, leaky, new_bias, new_dense, relative
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -33,6 +32,7 @@ class Occlusion:
     ----------
     links : for each marker, itself and the neighbours that it hears from (``graph.nearest`` with ``graph.FILLING``)
     mean_markers : (M, 3) m, subtracted from the input
+    spread : (M, K) m, how much each marker's place varies, then that of each it hears from, seen from it
     features : of marker nodes after each convolution; the input is 4
     hidden : units of the recurrent layer each way
     filled_first : without, lost markers come in at their mean place, not where distances put them (an ablation)
@@ -40,6 +40,7 @@ class Occlusion:
 
     links: tuple[tuple[int, ...], ...]
     mean_markers: Sequence[Sequence[float]]
+    spread: Sequence[Sequence[float]]
     features: tuple[int, ...] = (6, 10, 16)
     hidden: int = 800
     filled_first: bool = True
@@ -48,7 +49,7 @@ class Occlusion:
 
     def config(self) -> dict[str, Any]:
         """All that ``from_config`` needs, as JSON has it."""
-        names = ("links", "mean_markers", "features", "hidden", "filled_first")
+        names = ("links", "mean_markers", "spread", "features", "hidden", "filled_first")
         return {name: getattr(self, name) for name in names}
 
     @classmethod
@@ -56,7 +57,9 @@ class Occlusion:
         """The network of a card."""
         links = tuple(tuple(int(i) for i in row) for row in said["links"])
         features = tuple(int(f) for f in said["features"])
-        return cls(links, said["mean_markers"], features, int(said["hidden"]), bool(said["filled_first"]))
+        return cls(
+            links, said["mean_markers"], said["spread"], features, int(said["hidden"]), bool(said["filled_first"])
+        )
 
     @cached_property
     def _layers(self) -> list[EdgeConvolution]:
@@ -107,8 +110,9 @@ class Occlusion:
         count, window = markers.shape[:2]
         seen = visible[..., None].to(markers.dtype)
         given = markers if self.filled_first else seen * markers + (1 - seen) * self._mean
-        x = torch.cat([(given - self._mean) / SCALE_M, seen], -1).flatten(0, 1).transpose(0, 1)  # (M, N W, 4)
-        for k, layer in enumerate(self._layers):
+        x = torch.cat([given - self._mean, seen], -1).flatten(0, 1).transpose(0, 1)  # (M, N W, 4)
+        x = leaky(relative(self._layers[0], params, "marker0", x, self.spread) + params["marker0.b"])
+        for k, layer in enumerate(self._layers[1:], start=1):
             x = leaky(layer(params, f"marker{k}", x) + params[f"marker{k}.b"])
         x = x.transpose(0, 1).flatten(1).unflatten(0, (count, window))
         zero = x.new_zeros(2, count, self.hidden)

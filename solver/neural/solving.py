@@ -16,7 +16,7 @@ from solver.neural.align import Frame, align, into
 from solver.neural.augment import FrameNoise, corrupted
 from solver.neural.examples import BodyPool, Examples, ExampleSettings, Sampler, body_pool, generator
 from solver.neural.graph import Graph, build_graph
-from solver.neural.layers import Params
+from solver.neural.layers import Params, spread_of
 from solver.neural.layout import Group, Layout
 
 if TYPE_CHECKING:
@@ -236,10 +236,6 @@ class Means:
 def means_of(task: Task, graph: Graph, count: int = 2000) -> Means:
     """Of what a task draws; ``task.network`` is not used."""
     local, target = task.given(task.sampler.draw(task.whole, count, generator(2)))
-    apart = [
-        [float(_spread(local[:, m] if k == m else local[:, k] - local[:, m])) for k in row]
-        for m, row in enumerate(graph.marker_marker)
-    ]
     world, places = kinematics.forward(target.rotations, target.offsets, task.parents)
     return Means(
         _listed(local),
@@ -247,7 +243,7 @@ def means_of(task: Task, graph: Graph, count: int = 2000) -> Means:
         _listed(world[..., :2].transpose(-1, -2)),
         _listed(target.offsets),
         _listed(places),
-        np.round(np.array(apart), 4).tolist(),
+        spread_of(local, graph.marker_marker),
     )
 
 
@@ -255,11 +251,6 @@ def _listed(values: Tensor) -> list[Any]:
     """The mean over the batch, to five digits after the point."""
     mean: list[Any] = np.round(values.mean(0).numpy().astype(float), 5).tolist()
     return mean
-
-
-def _spread(points: Tensor) -> Tensor:
-    """M, root mean square of (B, 3) about its mean along an axis, at least 5 mm."""
-    return points.std(0).square().mean().sqrt().clamp_min(0.005)
 
 
 def samplers(
