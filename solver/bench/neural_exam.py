@@ -68,8 +68,10 @@ def recordings(body: Body, layout: Layout, clips: Sequence[Clip], count: int, se
             body.weights[layout.vertex],
             joints + rng.normal(0, JOINT_M, joints.shape),
         )
-        truth = (array.numpy().astype(float) for array in (drawn.markers, drawn.rotations, drawn.joints))
-        found.append(Recording(*truth, told=told))
+        markers, rotations, places = (
+            array.numpy().astype(float) for array in (drawn.markers, drawn.rotations, drawn.joints)
+        )
+        found.append(Recording(markers, rotations, places, told))
     return found
 
 
