@@ -12,6 +12,19 @@ from app.models.stages import StageBoard
 
 MOST = 12
 """Fits that are compared at most, the newest: beyond that no eye tells the curves apart."""
+CANDIDATE_COLOURS = 12
+"""So many colours are those of the candidates, and come round again beyond that."""
+
+
+def colour_places(board: StageBoard) -> dict[str, int]:
+    """The place among the categorical colours of each fit in the store but the one shown, by key.
+
+    The oldest comes first, so that a fit keeps its colour as further ones come; candidates have the colours before.
+    """
+    latest = board.latest("fit")
+    keys = [entry.key for entry in board.results.entries("fit")[:MOST]]
+    others = [key for key in reversed(keys) if latest is None or key != latest[0]]
+    return {key: CANDIDATE_COLOURS + place for place, key in enumerate(others)}
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from app.views.colours import RGB, rgb
 from solver.solve.paper.results import Descent, PaperLocalization, PaperSolve, Trace
 from solver.solve.results import Candidate, Orientation
 from widgets import palette
+from widgets.plots.scales import degrees
 
 _CHAINS_SHOWN = 5
 TO_THE_END = "all phases"
@@ -53,7 +54,7 @@ def of_orientation(ranked: Orientation) -> tuple[EnergyCurve, ...]:
     return tuple(
         EnergyCurve(
             stage=TO_THE_END if own.refined else "first phases, then left behind",
-            label=f"{i + 1}: {own.part}, heading {own.heading_deg:.0f}°",
+            label=f"{i + 1}: {own.part}, camera heading {degrees(own.heading_deg)}°",
             candidate=i,
             iteration=1 + np.arange(len(own.trace)),
             energy=np.array(own.trace, dtype=float),
@@ -90,7 +91,7 @@ def of_paper(
     chain_row = _rows(ranked, refined=False)
     for place, row in enumerate(order):
         fit = found.candidates[row]
-        label = f"chain {place + 1}, yaw {fit.yaw_deg:.0f}°"
+        label = f"chain {place + 1}, yaw {degrees(fit.yaw_deg)}°"
         colour = rgb(palette.categorical(_CHAINS_SHOWN)[place])
         curves.append(_curve("part search", label, chain_row.get(int(row), -1), fit.descent, colour, nothing))
     if solved is None:
@@ -98,7 +99,7 @@ def of_paper(
     yaw_row = _rows(ranked, refined=True)
     colours = palette.categorical(len(solved.yaws))
     for i, yaw in enumerate(solved.yaws):
-        label, row, colour = f"yaw {yaw.start_deg:.0f}°", yaw_row.get(i, -1), rgb(colours[i])
+        label, row, colour = f"start yaw {degrees(yaw.start_deg)}°", yaw_row.get(i, -1), rgb(colours[i])
         curves.append(_curve("2: pose", label, row, yaw.pose.descent, colour, nothing))
         curves.append(_curve("4: markers on vertices", label, row, yaw.markers.descent, colour, yaw.vertex))
         if i == solved.chosen:

@@ -47,7 +47,7 @@ def presence_row(
         outlier if outlier.any() else None,
         None if colours is None else colours[order],
         tuple(tracks.markers.labels[m] for m in order),
-        "When each marker was measured; a gap is where it was lost.",
+        "When each marker was measured, in the colour of its group; a gap is where it was lost.",
         order,
     )
 

@@ -52,12 +52,12 @@ class AnglesBinder:
             self.widget.set_curves(np.zeros(0), ())
             return
         bones = motion.marker_joint if motion is not None and not self.shown.stale("fit") else None
-        reference, said = self._reference(angles.convention)
+        reference, said, missing = self._reference(angles.convention)
         picture = self.shown.once(
             "angle curves", (angles, bones, reference), lambda: angles_picture(angles, bones, reference)
         )
         before = self.widget.shown()
-        self.widget.set_curves(picture.time, picture.plots, picture.convention, picture.zero_pose, said)
+        self.widget.set_curves(picture.time, picture.plots, picture.convention, picture.zero_pose, said, missing)
         known = self.bench.document.view.get("angles")
         titles = {plot.title for plot in picture.plots}
         if not before and isinstance(known, list) and titles & set(known):
@@ -65,21 +65,32 @@ class AnglesBinder:
         self.widget.set_time(self.bench.clock.time)
         self._select(frozenset({"bone"}))
 
-    def _reference(self, convention: str) -> tuple[Any, str]:
-        """The angles that are compared, and what they are of: their own, or those of a fit that is compared."""
+    def _reference(self, convention: str) -> tuple[Any, str, str]:
+        """The angles that are compared, and what they are of: their own, or those of a fit that is compared.
+
+        Where there are none although something is compared, the last says why.
+        """
+        missing = ""
         for ref, angles in self.shown.compared("angles").items():
-            return angles, self._said("angles", ref.key)
+            if angles.convention == convention:
+                return angles, self._said("angles", ref.key), ""
+            missing = "The angles that are compared are told by another convention, so they are not drawn."
         board = self.bench.board
         for ref in self.shown.compared("fit"):
+            missing = (
+                "The fit that is compared has no angles in this convention yet, so none are drawn: "
+                "go back to it once and run the stage Angles."
+            )
             for entry in board.results.entries("angles"):
                 same = entry.about.get("settings", {}).get("convention") == convention
                 if not same or entry.about.get("inputs", {}).get("fit") != ref.key:
                     continue
                 if board.results.is_loaded("angles", entry.key):
-                    return board.results.get("angles", entry.key), self._said("fit", ref.key)
+                    return board.results.get("angles", entry.key), self._said("fit", ref.key), ""
                 board.results.loaded.connect(self._loaded)
                 board.results.load_ahead("angles", entry.key)
-        return None, ""
+                missing = ""
+        return None, "", missing
 
     def _said(self, stage: str, key: str) -> str:
         row = next((row for row in self.bench.board.card(stage).earlier if row.key == key), None)

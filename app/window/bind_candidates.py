@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from app.models import edits
+from app.models.fits import CANDIDATE_COLOURS
 from app.models.workbench import Workbench
 from app.views.candidates import CandidateTable as Table
 from app.views.candidates import candidate_table, covered_by
@@ -47,8 +48,8 @@ class CandidatesBinder:
         pinned = self._pinned()
         rows = table.rows
         place = next((i for i, row in enumerate(rows) if row.candidate == pinned), -1) if pinned is not None else -1
-        inks = palette.categorical(12)
-        of_ghost = [max(row.pool if row.candidate < 0 else row.candidate, 0) % 12 for row in rows]
+        inks = palette.categorical(CANDIDATE_COLOURS)
+        of_ghost = [max(row.pool if row.candidate < 0 else row.candidate, 0) % CANDIDATE_COLOURS for row in rows]
         colours = inks[of_ghost] if rows else None
         self.widget.set_rows(rows, place, table.score, table.unit, colours, table.meaning)
         self.widget.set_steps(table.steps, self._step)

@@ -10,13 +10,14 @@ from PySide6.QtCore import Qt
 from app.models.workbench import Said, Workbench
 from app.views import scene
 from app.views.bodies import BodyTrack
-from app.views.colours import Legend
+from app.views.colours import RGB, Legend
 from app.views.posing import BONE_EDGES
 from app.window.ghosts import Ghosts
 from app.window.keys import how
 from app.window.shown import Shown
 from widgets import palette, theme
 from widgets.scene import ColourBar, Scene3D
+from widgets.scene import Legend as Drawn
 
 _NONE = np.zeros((0, 3))
 TROUBLE_REMEDY = "all else works on; save the session, and open it again if it does not come back by itself"
@@ -36,7 +37,7 @@ class SceneBinder:
         self.clusters: np.ndarray | None = None
         self._framed = False
         self._body: tuple[object, ...] | None = None
-        self._legend: Legend | None = None
+        self._legend: tuple[Legend, tuple[tuple[str, RGB], ...]] | None = None
         self._ghost_layers: set[str] = set()
         bench.clock.moved.connect(lambda time: self.draw())
         bench.clock.changed.connect(self.draw)
@@ -135,13 +136,15 @@ class SceneBinder:
         return self.bench.display.layers["ghosts"] or self.ghosts.replaces_body
 
     def _say(self, legend: Legend) -> None:
-        if legend == self._legend:
+        ghosts = tuple((ghost.title, ghost.colour) for ghost in self.ghosts.all) if self._ghosts_on() else ()
+        if (legend, ghosts) == self._legend:
             return
-        self._legend = legend
+        self._legend = legend, ghosts
         scale = legend.scale
         self.widget.set_legend(
             legend.title,
             legend.entries if scale is None else ColourBar(scale.lo, scale.hi, scale.unit, scale.name),
+            Drawn("Ghosts", ghosts) if ghosts else None,
         )
 
     def _clear(self) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from PySide6.QtCore import QTimer
 
 from app.models import edits
-from app.models.fits import CachedFits
+from app.models.fits import CachedFits, colour_places
 from app.models.workbench import Workbench
 from app.views import timelines as views
 from app.views.colours import by_cluster
@@ -140,9 +140,10 @@ class TimelinesBinder:
         if motion is not None and (latest is None or latest[0] not in display.hidden_fits):
             name = "fit (stale)" if shown.stale("fit") else "fit in force"
             fits[name], ranks[name] = motion, 0
-        others = [key for key in reversed(self.fits.known) if latest is None or key != latest[0]]
-        for rank, key in enumerate(others, start=1):  # the oldest first, so that colours stay as further fits come
-            residual = self.fits.known[key]
+        for key, place in colour_places(board).items():
+            residual = self.fits.known.get(key)
+            if residual is None:
+                continue
             if key in display.hidden_fits or (
                 chosen is not None and residual.residual.shape[1] <= chosen.max(initial=-1)
             ):
@@ -150,7 +151,7 @@ class TimelinesBinder:
             said = self.fits.said(key)
             label = said if len(said) <= _LONGEST else f"{said[:_LONGEST]}…"
             label = f"{label} ({key[:4]})" if label in fits else label
-            fits[label], ranks[label] = residual, rank
+            fits[label], ranks[label] = residual, place
         also = self._candidate(chosen)
         if not fits and also is None:
             return None

@@ -7,10 +7,13 @@ from functools import partial
 
 import numpy as np
 
+from app.models.fits import CANDIDATE_COLOURS, colour_places
 from app.models.signal import Signal
 from app.models.workbench import Workbench
 from app.views import bodies
 from app.views.bodies import BodyTrack
+from app.views.candidates import part_of_bones
+from app.views.colours import RGB, rgb
 from app.views.convergence import EnergyCurve
 from app.window.shown import Shown
 from solver.solve.results import Localization
@@ -19,9 +22,17 @@ from widgets import palette
 
 @dataclass(frozen=True)
 class Ghost:
-    """A body to draw: what it is, its colour and how opaque it is."""
+    """A body to draw.
+
+    Attributes
+    ----------
+    name : of its layer
+    title : what it is, in words for the legend
+    track, colour, opacity : see there
+    """
 
     name: str
+    title: str
     track: BodyTrack
     colour: tuple[int, int, int]
     opacity: float = 0.35
@@ -68,16 +79,22 @@ class Ghosts:
         own = self._of_iteration() if self._iteration is not None else self._of_selection()
         if own is not None:
             found.append(own)
-        colours = palette.categorical(8)
-        for k, (ref, motion) in enumerate(self.shown.compared("fit").items()):
+        places = colour_places(self.bench.board) if self.bench.document.is_open else {}
+        for ref, motion in self.shown.compared("fit").items():
+            place = places.get(ref.key, CANDIDATE_COLOURS)
             name = f"compared {ref.key}"
             track = self.shown.once(name, (motion,), partial(bodies.of_motion, self.shown.body, motion))
-            found.append(Ghost(name, track, _rgb(colours[(k + 1) % 8])))
+            found.append(Ghost(name, self._said(ref.key), track, rgb(palette.categorical(place + 1)[place])))
         before = [ghost.name for ghost in self.all], [ghost.track for ghost in self.all]
         self.replaces_body = own is not None and self._iteration is not None
         self.all = tuple(found)
         if before != ([ghost.name for ghost in found], [ghost.track for ghost in found]):
             self.changed.emit()
+
+    def _said(self, key: str) -> str:
+        """What a fit that is compared is, in words."""
+        row = next((row for row in self.bench.board.card("fit").earlier if row.key == key), None)
+        return "Compared fit" if row is None else f"Fit: {row.settings or row.when}"
 
     def _of_iteration(self) -> Ghost | None:
         found, markers = self.shown.get("localize"), self.shown.markers
@@ -87,13 +104,14 @@ class Ghosts:
             return None
         vertex = curve.vertex if curve.vertex is not None else np.zeros(0, dtype=np.intp)
         track = bodies.of_iteration(self.shown.body, curve.trace, step, found, markers, vertex)
-        return Ghost("iteration", track, curve.colour, 0.75)
+        return Ghost("iteration", f"Iteration of {curve.label}", track, curve.colour, 0.75)
 
     def _of_selection(self) -> Ghost | None:
         track = self.candidate_track()
         if track is not None:
-            row = self.bench.selection.candidate
-            return Ghost("candidate", track, _rgb(palette.categorical(12)[(row or 0) % 12]))
+            chosen = self.bench.selection.candidate or 0
+            title = f"Candidate {chosen + 1}: {self.shown.get('orient').candidates[chosen].part}"
+            return Ghost("candidate", title, track, _colour(chosen))
         found, prior, sync = (self.shown.get(name) for name in ("localize", "prior", "sync"))
         row, markers = self.bench.selection.hypothesis, self.shown.markers
         if row is None or markers is None or found is None or prior is None or sync is None:
@@ -101,12 +119,14 @@ class Ghosts:
         if isinstance(found, Localization):
             if row >= len(found.start):
                 return None
+            bones = found.bone[row]
             track = bodies.of_hypothesis(self.shown.body, found, row, prior, sync, markers)
         else:
             if row >= len(found.candidates):
                 return None
+            bones = found.candidates[row].bones
             track = bodies.of_chain(self.shown.body, found, row, prior, sync, markers)
-        return Ghost("hypothesis", track, _rgb(palette.categorical(12)[row % 12]))
+        return Ghost("hypothesis", f"Hypothesis: {part_of_bones(bones)}", track, _colour(row))
 
     def candidate_track(self, row: int | None = None) -> BodyTrack | None:
         """The body of a candidate, the selected one by default."""
@@ -122,5 +142,6 @@ class Ghosts:
         )
 
 
-def _rgb(colour: np.ndarray) -> tuple[int, int, int]:
-    return int(colour[0]), int(colour[1]), int(colour[2])
+def _colour(row: int) -> RGB:
+    place = row % CANDIDATE_COLOURS
+    return rgb(palette.categorical(CANDIDATE_COLOURS)[place])

@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 from widgets.icons import icon
 from widgets.panels.energy_bars import EnergyBar, TermKey
 from widgets.plots.ink import colour, em, pen
-from widgets.plots.scales import number
+from widgets.plots.scales import HEADING, degrees, figure
 from widgets.theme import colours
 
 
@@ -45,7 +45,7 @@ class Hypothesis:
     ----------
     candidate : its number, given back by the signals
     title : the part of the body, in words
-    heading_deg : degrees, which way it faces about the vertical
+    heading_deg : degrees, which way the camera looks about the vertical
     energy : what the answers are ranked by
     terms : that it is made of, all answers in the same order
     margin : energy over that of the first
@@ -84,11 +84,9 @@ class HypothesisCard(QFrame):
         bold.setBold(True)
         title.setFont(bold)
         figures = QLabel(
-            f"Heading {number(card.heading_deg, 1)}°\nEnergy {number(card.energy)}, {card.margin:.2f} × best"
+            f"Camera heading {degrees(card.heading_deg)}°\nEnergy {figure(card.energy)}, {card.margin:.2f} × best"
         )
-        figures.setToolTip(
-            "Heading: which way it faces about the vertical axis of the lab. Energy: the less, the better"
-        )
+        figures.setToolTip(f"{HEADING}. Energy: the less, the better")
         badges = [
             text
             for text, on in (
@@ -115,10 +113,8 @@ class HypothesisCard(QFrame):
         self._layout.addWidget(image)
         self._layout.addLayout(column, 1)
         self.set_low(False)
-        said = ", ".join(
-            [card.title, f"heading {card.heading_deg:.0f} degrees", f"{card.margin:.2f} times best", *badges]
-        )
-        self.setAccessibleName(said)
+        heading, margin = f"camera heading {degrees(card.heading_deg)} degrees", f"{card.margin:.2f} times best"
+        self.setAccessibleName(", ".join([card.title, heading, margin, *badges]))
 
     def set_low(self, low: bool) -> None:
         """Put the picture beside the figures instead of above them, where there is little height."""

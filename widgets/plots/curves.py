@@ -131,7 +131,13 @@ class CurvesView(QWidget):
         layout.addWidget(split)
 
     def set_curves(
-        self, time: np.ndarray, plots: Sequence[Any], convention: str = "", zero_pose: str = "", reference: str = ""
+        self,
+        time: np.ndarray,
+        plots: Sequence[Any],
+        convention: str = "",
+        zero_pose: str = "",
+        reference: str = "",
+        missing: str = "",
     ) -> None:
         """Show a result.
 
@@ -141,6 +147,7 @@ class CurvesView(QWidget):
         plots : see :class:`widgets.plots.angle_data.AnglePlot`; references are drawn dashed
         convention, zero_pose : what the angles are, in words
         reference : what the dashed curves are of, in words
+        missing : why something that is compared has no curves here, a sentence
         """
         again = [plot.title for plot in plots] == [plot.title for plot in self._all]
         self._time, self._all = np.asarray(time, float), tuple(plots)
@@ -148,7 +155,7 @@ class CurvesView(QWidget):
         dashed = any(curve.reference is not None for plot in plots for curve in plot.curves)
         against = f" Dashed: {reference or 'compared with'}." if dashed else ""
         told = "Degrees." if self.convention.count() else f"{convention}, degrees."
-        self._title.setText(f"{told}{against}" if plots else "")
+        self._title.setText(f"{told}{against} {missing}".rstrip() if plots else "")
         self._title.setToolTip(f"{convention}, degrees.{zero}" if plots else "")
         if not again:
             self._fill()

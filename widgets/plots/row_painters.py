@@ -18,6 +18,8 @@ from widgets.theme import colours
 
 _FILLED = 0.4
 """How strong the marker's own colour is where it was not measured but made up."""
+_KEY_COLOURS = 4
+"""So many of the strips' colours stand for all of them in the key."""
 
 
 def painter_of(row: Row) -> RowPainter:
@@ -70,7 +72,7 @@ class PresencePainter:
             for k in range(1, self.markers):
                 y = round(area.top() + k * strip)
                 painter.drawLine(QPointF(area.left(), y), QPointF(area.right(), y))
-        self._paint_key(painter, area, np.array(look.accent) if self.row.colours is None else self.row.colours[0])
+        self._paint_key(painter, area, np.atleast_2d(seen))
 
     def paint_selected(self, painter: QPainter, area: QRectF, selected: frozenset[int]) -> None:
         """Frame the strips of markers, over the picture."""
@@ -82,24 +84,28 @@ class PresencePainter:
             painter.drawRect(QRectF(area.left() + 1, area.top() + low * strip, area.width() - 2, (high - low) * strip))
 
     def _paint_key(self, painter: QPainter, area: QRectF, seen: np.ndarray) -> None:
-        """Say below the row's name what the shades mean, where there is room."""
+        """Say below the row's name what the shades mean, where there is room; ``seen`` (M, 3) of the strips."""
         look, line = colours(), QFontMetricsF(painter.font()).height()
-        half = np.array(look.base) + _FILLED * (seen.astype(float) - look.base)
-        entries: list[tuple[str, np.ndarray | tuple[int, ...]]] = [
+        seen = np.array(list(dict.fromkeys(map(tuple, seen.tolist())))[:_KEY_COLOURS], dtype=float)
+        entries = [
             ("seen", seen),
-            ("filled", half),
-            ("outlier", look.text),
-            ("lost", look.base),
+            ("filled", np.array(look.base) + _FILLED * (seen - look.base)),
+            ("outlier", np.array([look.text])),
+            ("lost", np.array([look.base])),
         ]
         known = {"filled": self.filled is not None, "outlier": self.outlier is not None}
         entries = [entry for entry in entries if known.get(entry[0], True)]
         if area.height() < (len(entries) + 1.3) * line:
             return
-        for k, (name, ink) in enumerate(entries):
+        for k, (name, inks) in enumerate(entries):
             top = area.top() + (k + 1.3) * line
+            box = QRectF(12, top + 0.25 * line, 0.9 * line, 0.5 * line)
+            for i, ink in enumerate(inks):
+                part = box.width() / len(inks)
+                painter.fillRect(QRectF(box.left() + i * part, box.top(), part, box.height()), colour(ink))
             painter.setPen(pen(look.border))
-            painter.setBrush(colour(ink))
-            painter.drawRect(QRectF(12, top + 0.25 * line, 0.9 * line, 0.5 * line))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRect(box)
             painter.setPen(colour(look.faint))
             elided(painter, QRectF(12 + 1.3 * line, top, area.left() - 24 - 1.3 * line, line), name)
 

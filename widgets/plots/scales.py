@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+HEADING = "Which way the camera looks about the vertical, as found; 0 along the lab's first axis, 90 along its second"
+"""What the camera's heading of an answer means."""
+
 
 def nice_step(rough: float) -> float:
     """The smallest of 1, 2, 5 times a power of ten that is not below ``rough``."""
@@ -53,6 +56,22 @@ def number(value: float, step: float | None = None) -> str:
     if float(text.replace("−", "-")) == 0:
         text = text.lstrip("-")
     return text.replace("-", "−")
+
+
+def figure(value: float) -> str:
+    """A number of three digits, so that those below each other are alike: "31.0" beside "30.4", "107", never "107."."""
+    if value is None or not 1e-3 <= abs(value) < 1e5:
+        return number(value)
+    if abs(value) >= 999.5:
+        return f"{value:.0f}".replace("-", "−")
+    return f"{value:#.3g}".rstrip(".").replace("-", "−")
+
+
+def degrees(value: float) -> str:
+    """A direction about the vertical as a whole number from −179 to 180."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    return number(180.0 - (180.0 - round(value)) % 360.0, 1)
 
 
 def clock(seconds: float, step: float = 0.01) -> str:

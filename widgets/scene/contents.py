@@ -95,7 +95,9 @@ class Contents(Sight):
         self._stage.remove(layer)
         self._changed()
 
-    def set_legend(self, title: str, entries: Sequence[tuple[str, Rgb]] | ColourBar | None) -> None:
-        """What the colours mean: kinds with their colour, or a scale; None for no legend."""
-        self._sheet.legend = None if entries is None else Legend(title, entries)
+    def set_legend(
+        self, title: str, entries: Sequence[tuple[str, Rgb]] | ColourBar | None, also: Legend | None = None
+    ) -> None:
+        """What the colours mean: kinds with their colour, or a scale; None for no legend. ``also`` stands below it."""
+        self._sheet.legend = also if entries is None else Legend(title, entries, also)
         self.update()

@@ -27,7 +27,8 @@ class ColourBar:
 
 @dataclass(frozen=True)
 class Legend:
-    """A title, and either kinds (words and colour) or a scale."""
+    """A title, and either kinds (words and colour) or a scale; ``also`` comes below it."""
 
     title: str
     entries: Sequence[tuple[str, Rgb]] | ColourBar
+    also: Legend | None = None

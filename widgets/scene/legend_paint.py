@@ -45,21 +45,33 @@ def _draw(painter: QPainter, legend: Legend, width: float, height: float, look: 
     bold = QFont(painter.font())
     bold.setBold(True)
     panel = _Panel(painter, bold, look, width, height)
-    if isinstance(legend.entries, ColourBar):
-        return panel.bar(legend.title, legend.entries)
-    return panel.kinds(legend.title, list(legend.entries))
+    box = QRectF()
+    part: Legend | None = legend
+    while part is not None:
+        if isinstance(part.entries, ColourBar):
+            drawn = panel.bar(part.title, part.entries)
+        else:
+            drawn = panel.kinds(part.title, list(part.entries), part.also)
+        box, part = box.united(drawn), part.also
+    return box
+
+
+def _rows(legend: Legend) -> int:
+    return 2 if isinstance(legend.entries, ColourBar) else len(legend.entries)
 
 
 class _Panel:
     def __init__(self, painter: QPainter, bold: QFont, look: Colours, width: float, height: float) -> None:
         self._painter, self._bold, self._look = painter, bold, look
-        self._width, self._height = width, height
+        self._width, self._height, self._top = width, height, _MARGIN
         self._plain = QFont(painter.font())
         self._metrics, self._title_metrics = QFontMetricsF(self._plain), QFontMetricsF(bold)
         self._row = self._metrics.height() + 2.0
 
-    def kinds(self, title: str, entries: list[tuple[str, Rgb]]) -> QRectF:
-        rows = int(max(1, (self._height - 2 * _MARGIN - 2 * _PAD - self._row - 4) // self._row))
+    def kinds(self, title: str, entries: list[tuple[str, Rgb]], also: Legend | None = None) -> QRectF:
+        """Draw a panel, and leave room for another one below it."""
+        below = 0.0 if also is None else (1 + _rows(also)) * self._row + 2 * _PAD + _GAP
+        rows = int(max(1, (self._height - self._top - below - _MARGIN - 2 * _PAD - self._row - 4) // self._row))
         swatch = self._metrics.height() * 0.7
         columns = -(-len(entries) // rows)
         most = max(1, int(0.5 * self._width // 90))
@@ -116,7 +128,8 @@ class _Panel:
         room = self._width - 2 * _MARGIN - 2 * _PAD
         inside = min(max(inside, self._title_metrics.horizontalAdvance(title)), room)
         size = (inside + 2 * _PAD, self._row + 4.0 + below + 2 * _PAD)
-        box = QRectF(self._width - _MARGIN - size[0], _MARGIN, *size)
+        box = QRectF(self._width - _MARGIN - size[0], self._top, *size)
+        self._top = box.bottom() + _GAP
         self._painter.setPen(QPen(qcolour(self._look.border), 1.0))
         self._painter.setBrush(qcolour(self._look.base, 225))
         self._painter.drawRoundedRect(box, 5.0, 5.0)

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from widgets.icons import icon
+from widgets.plots.scales import HEADING, degrees, figure
 from widgets.tables.array_table import ArrayTable
 from widgets.tables.columns import Column
 
@@ -32,7 +33,7 @@ class CandidateRecord:
     part : the bones that carry markers, in words
     bones : their names
     fate : how far it got
-    yaw_deg, heading_deg : degrees, the yaw it started from, and which way it ended up; NaN if there is none
+    yaw_deg, heading_deg : degrees, the yaw it started from, and which way the camera looks; NaN if there is none
     distance : mm, from the markers to the body as first laid over them; NaN if it was not
     score : what it is ranked by; NaN if not scored
     margin : score over that of the best
@@ -81,11 +82,11 @@ def candidate_columns(
             tooltip="The part of the body that the groups are taken for",
             tips=[", ".join(row.bones) for row in rows],
         ),
-        Column(score, figures("score"), unit, "#.3g", meaning or "What the candidates are ranked by, the least first"),
+        Column(score, figures("score"), unit, figure, meaning or "What the candidates are ranked by, the least first"),
         Column("Margin", figures("margin"), "× best", ".2f", "Score over that of the best: near 1 they tie"),
         Column("Markers", figures("covered", 100), "%", ".0f", "Share of the markers that it explains", bar=(0, 100)),
-        Column("Yaw", figures("yaw_deg"), "deg", ".0f", "About the vertical axis, as it was started"),
-        Column("Heading", figures("heading_deg"), "deg", ".0f", "Which way it ended up, about the vertical axis"),
+        Column("Camera heading", figures("heading_deg"), "°", degrees, HEADING),
+        Column("Start yaw", figures("yaw_deg"), "°", degrees, "Turn about the vertical that it was started from"),
         Column("Distance", figures("distance"), "mm", ".0f", "From the markers to the body as first laid over them"),
         Column("State", states, tooltip="How far the search took it"),
     ]

@@ -23,35 +23,44 @@ def draw_lines(painter: QPainter, ends: np.ndarray, rgb: tuple[int, int, int], w
             painter.drawLines(lines)
 
 
-def draw_landmarks(painter: QPainter, at: np.ndarray, links: np.ndarray, visibility: np.ndarray) -> None:
+def stroke(width: float, height: float) -> float:
+    """How large dots and lines are drawn over a picture shown so large, px; 1 where it is some 900 by 500."""
+    return min(max((width * height) ** 0.5 / 675.0, 0.45), 1.4)
+
+
+def draw_landmarks(
+    painter: QPainter, at: np.ndarray, links: np.ndarray, visibility: np.ndarray, size: float = 1.0
+) -> None:
     """Dots at (L, 2) px, NaN left out, linked by (E, 2), as strong as they are sure (L)."""
     for a, b in links:
         if np.isfinite(at[[a, b]]).all():
             sure = min(visibility[a], visibility[b])
             line = QLineF(*at[a].tolist(), *at[b].tolist())
-            for colour, width in ((QColor(0, 0, 0, int(40 + 110 * sure)), 3.5), (_faded(sure), 1.8)):
+            for colour, width in ((QColor(0, 0, 0, int(40 + 110 * sure)), 3.5 * size), (_faded(sure), 1.8 * size)):
                 painter.setPen(QPen(colour, width))
                 painter.drawLine(line)
     painter.setPen(QPen(QColor(0, 0, 0, 170), 1.0))
     for (x, y), sure in zip(at.tolist(), visibility):
         if x == x:
             painter.setBrush(_faded(sure))
-            painter.drawEllipse(QPointF(x, y), 3.2, 3.2)
+            painter.drawEllipse(QPointF(x, y), 3.2 * size, 3.2 * size)
 
 
-def draw_markers(painter: QPainter, at: np.ndarray, colours: np.ndarray, selected: Sequence[int]) -> None:
+def draw_markers(
+    painter: QPainter, at: np.ndarray, colours: np.ndarray, selected: Sequence[int], size: float = 1.0
+) -> None:
     """Balls at (M, 2) px, NaN left out, in colours (M, 3), with a ring about those that are selected."""
-    painter.setPen(QPen(QColor(0, 0, 0, 200), 1.2))
+    painter.setPen(QPen(QColor(0, 0, 0, 200), 1.2 * min(size, 1.0)))
     for (x, y), rgb in zip(at.tolist(), colours.tolist()):
         if x == x:
             painter.setBrush(QColor(*rgb))
-            painter.drawEllipse(QPointF(x, y), 4.5, 4.5)
+            painter.drawEllipse(QPointF(x, y), 4.5 * size, 4.5 * size)
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for i in selected:
         if i < len(at) and not np.isnan(at[i, 0]):
             for colour, width in ((QColor(255, 255, 255, 200), 4.0), (QColor(*palette.SELECTED), 2.0)):
                 painter.setPen(QPen(colour, width))
-                painter.drawEllipse(QPointF(*at[i].tolist()), 8.0, 8.0)
+                painter.drawEllipse(QPointF(*at[i].tolist()), 4.5 * size + 3.0, 4.5 * size + 3.0)
 
 
 def draw_text(painter: QPainter, text: str, width: float) -> None:

@@ -23,7 +23,7 @@ from widgets import palette, theme
 from widgets.guard import PaintGuard
 from widgets.images import draw_focus, of_rgb, save
 from widgets.video.outline import Outline
-from widgets.video.paint import draw_landmarks, draw_lines, draw_markers, draw_text
+from widgets.video.paint import draw_landmarks, draw_lines, draw_markers, draw_text, stroke
 from widgets.video.zoom import Zoom
 
 LAYERS = ("picture", "landmarks", "markers", "body", "skeleton")
@@ -277,14 +277,15 @@ class VideoView(QWidget):
             painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
             painter.drawImage(area, self._picture)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        size = stroke(area.width(), area.height())
         if "body" not in self._hidden:
-            draw_lines(painter, self._segments(self._body), self._body_colour, 1.5)
+            draw_lines(painter, self._segments(self._body), self._body_colour, 1.5 * size)
         if "skeleton" not in self._hidden:
-            draw_lines(painter, self._segments(self._bones), self._bone_colour, 2.5)
+            draw_lines(painter, self._segments(self._bones), self._bone_colour, 2.5 * size)
         if "landmarks" not in self._hidden:
-            draw_landmarks(painter, self.to_widget(self._landmarks), self._links, self._visibility)
+            draw_landmarks(painter, self.to_widget(self._landmarks), self._links, self._visibility, size)
         if "markers" not in self._hidden:
-            draw_markers(painter, self.to_widget(self._markers), self._colours, self._selected)
+            draw_markers(painter, self.to_widget(self._markers), self._colours, self._selected, size)
         if self._text:
             draw_text(painter, self._text, self.width())
 

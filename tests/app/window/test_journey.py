@@ -54,7 +54,7 @@ def states(window: MainWindow) -> dict[str, str]:
 
 def run(window: MainWindow, spin: Spin) -> None:
     assert window.table.trigger("run.all"), window.said
-    spin(lambda: not window.bench.runner.running, "the run")
+    spin(lambda: not window.bench.runner.running, "the run", 600)
     assert set(states(window).values()) == {"cached"}, [said.sentence for said in window.said]
     spin(lambda: not window.shown.stale("fit") and not window.shown.stale("angles"), "what is shown of the run")
 
