@@ -103,6 +103,7 @@ def number_box(spec: FieldSpec, end: str = "") -> NumberBox:
     typed = _typed(box, spec)
     if end:
         typed.setPrefix(f"{end} ")
+        fit(box)
         typed.setAccessibleName(f"{spec.label}, {end}")
     return typed
 
@@ -112,8 +113,15 @@ def _typed(box: Any, spec: FieldSpec) -> Any:
     box.setKeyboardTracking(False)
     box.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
     box.setAccessibleName(spec.label)
-    box.setMinimumWidth(box.fontMetrics().horizontalAdvance(f"from 000.00{suffix(spec)}") + 24)
+    fit(box)
     return box
+
+
+def fit(control: QWidget) -> None:
+    """Make room for a number with what stands about it, in the font there is."""
+    if isinstance(control, NumberBox | CountBox):
+        held = f"{control.prefix()}000.00{control.suffix()}"
+        control.setMinimumWidth(control.fontMetrics().horizontalAdvance(held) + 30)
 
 
 def on_change(control: Any, tell: Callable[..., None]) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from PySide6.QtCore import QSignalBlocker, Signal
+from PySide6.QtCore import QEvent, QSignalBlocker, QTimer, Signal
 from PySide6.QtGui import QFont
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -24,6 +24,7 @@ from widgets.panels.controls import (
     CountBox,
     NumberBox,
     control_of,
+    fit,
     number_box,
     on_change,
     read,
@@ -91,6 +92,11 @@ class Editor(QWidget):
                     write(control, part)
         self._grey()
 
+    def fit(self) -> None:
+        """Make room for the values in the font there is."""
+        for control in self._controls:
+            fit(control)
+
     def _tell(self, *_: object) -> None:
         self._grey()
         self.changed.emit(self.value())
@@ -126,6 +132,8 @@ class SettingsForm(QWidget):
         self._editors: dict[str, Editor] = {}
         self._labels: dict[str, QLabel] = {}
         self._resets: dict[str, QToolButton] = {}
+        self._fitting = QTimer(self, singleShot=True, interval=0)  # once the controls have the font, too
+        self._fitting.timeout.connect(self._fit)
 
     def set_fields(self, specs: Sequence[FieldSpec]) -> None:
         """Show these settings; controls are kept where only values changed, so that the focus stays."""
@@ -153,8 +161,7 @@ class SettingsForm(QWidget):
         for row, spec in enumerate(specs):
             label, editor, reset = QLabel(spec.label), Editor(spec), QToolButton()
             label.setWordWrap(True)
-            wide = label.fontMetrics().horizontalAdvance(spec.label) + 8
-            label.setMinimumWidth(min(wide, 9 * label.fontMetrics().height()))
+            _fit_label(label)
             label.setBuddy(editor)
             label.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
             reset.setIcon(icon("reset"))
@@ -169,6 +176,17 @@ class SettingsForm(QWidget):
                 if not isinstance(part, QCheckBox) or spec.kind == "bool":
                     part.setToolTip(_tip(spec))
 
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow another font."""
+        super().changeEvent(event)
+        if event.type() in (QEvent.Type.FontChange, QEvent.Type.StyleChange) and hasattr(self, "_fitting"):
+            self._fitting.start()
+
+    def _fit(self) -> None:
+        for label, editor in zip(self._labels.values(), self._editors.values()):
+            _fit_label(label)
+            editor.fit()
+
     def _mark(self, spec: FieldSpec) -> None:
         """Show what differs from its default by bold type and a way back."""
         changed, label = spec.value != spec.default, self._labels[spec.name]
@@ -182,6 +200,11 @@ class SettingsForm(QWidget):
         spec = self._editors[name].spec
         self._editors[name].set_value(spec.default)
         self.changed.emit(name, spec.default)
+
+
+def _fit_label(label: QLabel) -> None:
+    metrics = label.fontMetrics()
+    label.setMinimumWidth(min(metrics.horizontalAdvance(label.text()) + 8, 7 * metrics.height()))
 
 
 def _shape(spec: FieldSpec) -> tuple:

@@ -61,7 +61,7 @@ class StageCard(QFrame):
         self.setFrameShape(QFrame.Shape.StyledPanel)
         self.setAutoFillBackground(True)
         self.setBackgroundRole(QPalette.ColorRole.AlternateBase)
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
         self._data = StageData(name, name)
         self._shown: StageData | None = None
         self._icon, self._title, self._state, self._seconds = QLabel(), QLabel(), QLabel(), QLabel()
@@ -184,6 +184,9 @@ class StageCard(QFrame):
             bold.setBold(True)
             self._title.setFont(bold)
             self._paint()
+            if event.type() == QEvent.Type.FontChange and self._earlier_shown:
+                results, self._earlier_shown = self._earlier_shown, None
+                self._show_earlier(results)
         super().changeEvent(event)
 
     def _open(self, on: bool) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from PySide6.QtCore import QItemSelection, QItemSelectionModel, QRect, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QItemSelection, QItemSelectionModel, QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QContextMenuEvent, QGuiApplication, QKeyEvent, QKeySequence, QPainter
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -137,7 +137,9 @@ class ArrayTable(QWidget):
         layout.addWidget(self.view, 1)
         self._quiet = False
         self._told: list[int] = []
-        self._fitted = False
+        self._fitted, self._line = False, 0
+        self._refit = QTimer(self, singleShot=True, interval=0)  # once the view has the font, too
+        self._refit.timeout.connect(self._fit_font)
         for signal in (self._sorted.rowsInserted, self._sorted.rowsRemoved, self._sorted.modelReset):
             signal.connect(lambda *_: self._say_count())
 
@@ -223,11 +225,22 @@ class ArrayTable(QWidget):
         """Header and three rows."""
         return QSize(180, 9 * self.fontMetrics().height())
 
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow another font."""
+        super().changeEvent(event)
+        if event.type() in (QEvent.Type.FontChange, QEvent.Type.StyleChange) and hasattr(self, "_refit"):
+            self._refit.start()
+
+    def _fit_font(self) -> None:
+        """Fit rows and columns where the font is another one; columns that were dragged stay otherwise."""
+        if self._fitted and self.fontMetrics().height() != self._line:
+            self._fit()
+
     def _row(self, index: Index) -> int:
         return self._sorted.mapToSource(index).row()
 
     def _fit(self) -> None:
-        line = self.fontMetrics().height()
+        self._line = line = self.fontMetrics().height()
         self.view.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.view.verticalHeader().setDefaultSectionSize(round(1.45 * line))
         header = self.view.horizontalHeader()
