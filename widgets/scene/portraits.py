@@ -25,7 +25,7 @@ class Portraits:
     """
 
     def __init__(self, beside: Stage) -> None:
-        self._stage = Stage(theme.colours(), beside)
+        self._stage = Stage(theme.LIGHT, beside)
 
     def draw(
         self,
@@ -44,7 +44,7 @@ class Portraits:
             blank = QImage(width, height, QImage.Format.Format_RGB32)
             blank.fill(theme.qcolour(theme.colours().faint))
             return blank
-        stage.set_look(theme.colours())
+        stage.set_look(theme.LIGHT)  # on a dark ground a body half seen through is hardly told from it
         stage.set_mesh("body", vertices, faces, colour, _OPACITY)
         stage.set_bones("skeleton", joints, edges, colour)
         stage.set_markers(markers, _MARKER, None)
