@@ -14,7 +14,7 @@ import ezc3d
 import numpy as np
 import pytest
 from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QFileDialog, QProgressDialog
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QProgressDialog
 
 from app.models.exports import formats
 from app.window import exporting
@@ -134,8 +134,8 @@ def test_every_format_by_the_dialog(window: MainWindow, answer: Answer, spin: Sp
 
 def save_as(path: Path) -> Callable[[QFileDialog], None]:
     def act(dialog: QFileDialog) -> None:
-        dialog.setDirectory(str(path.parent))
-        dialog.selectFile(path.name)
+        # Typed, as a user would: selectFile() leaves a name alone that has the focus.
+        dialog.findChild(QLineEdit, "fileNameEdit").setText(str(path))
         dialog.accept()
 
     return act
