@@ -79,8 +79,9 @@ class Ghosts:
         own = self._of_iteration() if self._iteration is not None else self._of_selection()
         if own is not None:
             found.append(own)
-        places = colour_places(self.bench.board) if self.bench.document.is_open else {}
-        for ref, motion in self.shown.compared("fit").items():
+        is_open = self.bench.document.is_open
+        places = colour_places(self.bench.board) if is_open else {}
+        for ref, motion in self.shown.compared("fit").items() if is_open else ():
             place = places.get(ref.key, CANDIDATE_COLOURS)
             name = f"compared {ref.key}"
             track = self.shown.once(name, (motion,), partial(bodies.of_motion, self.shown.body, motion))

@@ -279,9 +279,9 @@ class VideoView(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         size = stroke(area.width(), area.height())
         if "body" not in self._hidden:
-            draw_lines(painter, self._segments(self._body), self._body_colour, 1.5 * size)
+            draw_lines(painter, self._segments(self._body), self._body_colour, max(1.5 * size, 1.5))
         if "skeleton" not in self._hidden:
-            draw_lines(painter, self._segments(self._bones), self._bone_colour, 2.5 * size)
+            draw_lines(painter, self._segments(self._bones), self._bone_colour, max(2.5 * size, 2.0))
         if "landmarks" not in self._hidden:
             draw_landmarks(painter, self.to_widget(self._landmarks), self._links, self._visibility, size)
         if "markers" not in self._hidden:
