@@ -55,6 +55,6 @@ RANGES: dict[tuple[str, str], tuple[float, float]] = {
     ("orient", "focal_guess"): (0.2, 5),
     ("fit", "candidate"): (0, 999),
     ("fit", "video_share"): (0.001, 10),
-    ("fit", "network_deg"): (0.5, 180),
+    ("fit", "looseness"): (0.1, 10),
     ("network", "tune_steps"): (0, 100_000),
 }
