@@ -52,9 +52,11 @@ RANGES: dict[tuple[str, str], tuple[float, float]] = {
     ("orient", "offset_mm"): (0, 50),
     ("orient", "offset_spread_mm"): (0.1, 50),
     ("orient", "prior_deg"): (1, 180),
+    ("orient", "bias_deg"): (0.1, 180),
     ("orient", "focal_guess"): (0.2, 5),
     ("fit", "candidate"): (0, 999),
     ("fit", "video_share"): (0.001, 10),
     ("fit", "looseness"): (0.1, 10),
     ("network", "tune_steps"): (0, 100_000),
+    ("network", "default_deg"): (0.1, 180),
 }

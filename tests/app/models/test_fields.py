@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import get_args, get_origin, get_type_hints
 
 import pytest
 
 from app.models.fields import descriptions, setting_of, settings_of, title
+from app.models.ranges import RANGES
 from solver.pipeline.inputs import MarkerSettings, SyncSettings
 from solver.pipeline.methods import GRAPHS
 from solver.pipeline.stages_paper import PaperSegmentSettings
@@ -88,3 +90,15 @@ def test_every_setting_has_its_meaning_and_a_range_around_its_default(setting) -
 
 def test_every_stage_has_a_title() -> None:
     assert all(title(stage.name)[0].isupper() for graph in GRAPHS.values() for stage in graph)
+
+
+def test_every_number_has_a_range_and_every_range_a_setting() -> None:
+    """A setting that was renamed leaves its range behind, and stands in the form without one."""
+    numbers = {
+        (stage.name, name)
+        for graph in GRAPHS.values()
+        for stage in graph
+        for name, kind in get_type_hints(stage.settings).items()
+        if {int, float} & {kind, *get_args(kind)} and get_origin(kind) is not tuple
+    }
+    assert set(RANGES) == numbers
