@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFont, QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPalette, QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -86,6 +86,7 @@ class HypothesisCard(QFrame):
         figures = QLabel(
             f"Camera heading {degrees(card.heading_deg)}°\nEnergy {figure(card.energy)}, {card.margin:.2f} × best"
         )
+        figures.setWordWrap(True)
         figures.setToolTip(f"{HEADING}. Energy: the less, the better")
         badges = [
             text
@@ -118,6 +119,7 @@ class HypothesisCard(QFrame):
 
     def set_low(self, low: bool) -> None:
         """Put the picture beside the figures instead of above them, where there is little height."""
+        self._low = low
         line = self.fontMetrics().height()
         directions = QBoxLayout.Direction
         self._layout.setDirection(directions.LeftToRight if low else directions.TopToBottom)
@@ -152,6 +154,12 @@ class HypothesisCard(QFrame):
         painter.setPen(pen(look.accent if strong else look.border, 2.5 if self._chosen else 1))
         painter.setBrush(colour(look.raised))
         painter.drawRoundedRect(QRectF(self.rect()).adjusted(1.5, 1.5, -1.5, -1.5), 4, 4)
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Make room for larger words."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.FontChange and hasattr(self, "_low"):
+            self.set_low(self._low)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Choose it."""

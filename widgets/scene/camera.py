@@ -116,19 +116,15 @@ class Camera:
         tan = np.tan(0.5 * self.view_angle) / margin
         reach = np.array([tan * aspect, tan])
         basis = self.basis()
-        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        for _ in range(4):  # near points weigh more than far ones, so the middle moves with the distance
-            seen = (points - centre) @ basis.T
-            across = np.zeros(len(points)) if self.parallel else seen[:, 2]
-            distance = max(float((across[:, None] + np.abs(seen[:, :2]) / reach).max()), 0.3)
-            if self.parallel:
-                shown = seen[:, :2]
-            else:
-                shown = seen[:, :2] * (distance / np.maximum(distance - across, 1e-6))[:, None]
-            middle = 0.5 * (shown.min(axis=0) + shown.max(axis=0))
-            centre = centre + middle @ basis[:2]
-        x, y, z = (float(c) for c in centre)
-        return replace(self, target=(x, y, z), distance=min(distance, FARTHEST))
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        seen = (points - middle) @ basis.T
+        # A point is in the picture if |across - camera| <= reach * (camera depth - its depth): four planes to touch.
+        lean = np.zeros(len(points)) if self.parallel else seen[:, 2]
+        high = (seen[:, :2] + lean[:, None] * reach).max(axis=0)
+        low = (-seen[:, :2] + lean[:, None] * reach).max(axis=0)
+        distance = float(np.clip((0.5 * (high + low) / reach).max(), 0.3, FARTHEST))
+        x, y, z = (float(c) for c in middle + 0.5 * (high - low) @ basis[:2])
+        return replace(self, target=(x, y, z), distance=distance)
 
     def state(self) -> dict[str, Any]:
         """Plain numbers, for a file."""
