@@ -84,22 +84,26 @@ def fill_regression(positions: np.ndarray, rate: float, settings: FillSettings) 
     present = np.isfinite(positions).all(axis=2)
     near = neighbours_of(positions)
     gaps = gaps_to_fill(present, rate, settings)
-    parts: Parts = {}
+    start: Parts = {}
     for gap in gaps:
         part = rigid_part(positions, present, near, gap, settings.neighbours) or spline_part(positions, present, gap)
         if part is not None:
-            parts[gap] = part
-    for _ in range(_ROUNDS):
+            start[gap] = part
+    parts = start
+    for left in reversed(range(_ROUNDS)):
         whole = positions.copy()
         for gap, (_, values) in parts.items():
             whole[gap.first : gap.last + 1, gap.marker] = values
         scene = _Scene(whole, present, np.isfinite(whole).all(axis=2), near)
-        parts |= _round(scene, gaps, settings.neighbours)
+        parts = start | _round(scene, gaps, settings.neighbours, judged=not left)
     return together(positions, list(parts.values()), settings)
 
 
-def _round(scene: _Scene, gaps: list[Gap], most: int) -> Parts:
-    """Every gap that regression can fill; those with the same neighbours share their learning."""
+def _round(scene: _Scene, gaps: list[Gap], most: int, judged: bool) -> Parts:
+    """Every gap that regression can fill; those with the same neighbours share their learning.
+
+    Only the last round is ``judged``: the errors of the others, half of the work, would be looked at by nobody.
+    """
     alike = defaultdict(list)
     seen = scene.present.sum(axis=1)
     for gap in gaps:
@@ -111,7 +115,7 @@ def _round(scene: _Scene, gaps: list[Gap], most: int) -> Parts:
     for (marker, others), members in alike.items():
         local = _local(scene, marker, np.array(others), members) if len(others) >= FEWEST else None
         if local is not None:
-            found |= _predicted(scene, local, marker, members)
+            found |= _predicted(scene, local, marker, members, judged)
     return found
 
 
@@ -140,15 +144,16 @@ def _local(scene: _Scene, marker: int, group: np.ndarray, gaps: list[Gap]) -> _L
     return _Local(group, frames, R_lab_local, centre, features, target, measured, rows, weight / weight.sum())
 
 
-def _predicted(scene: _Scene, local: _Local, marker: int, gaps: list[Gap]) -> Parts:
-    """The gaps filled, each with the error that the same gap would have had elsewhere."""
+def _predicted(scene: _Scene, local: _Local, marker: int, gaps: list[Gap], judged: bool) -> Parts:
+    """The gaps filled; where ``judged``, each with the error that the same gap would have had elsewhere, else NaN."""
     X, Y = local.features[local.train], local.target[local.train]
     mean_x, mean_y = local.weight @ X, local.weight @ Y
     X, Y = X - mean_x, Y - mean_y
     weighted = X * local.weight[:, None]
     gram, cross = weighted.T @ X, weighted.T @ Y
     tried = local.features[local.seen] - mean_x, local.target[local.seen] - mean_y
-    residual = _held_out(X, Y, local.weight, gram, cross, tried, np.searchsorted(local.seen, local.train))
+    rows = np.searchsorted(local.seen, local.train)
+    residual = _held_out(X, Y, local.weight, gram, cross, tried, rows) if judged else None
     found: Parts = {}
     for gap in gaps:
         span = np.arange(gap.first, gap.last + 1)
@@ -163,8 +168,10 @@ def _predicted(scene: _Scene, local: _Local, marker: int, gaps: list[Gap]) -> Pa
         guess = around @ slope + mean_y
         inside = guess[: len(span)] + blend(gap, ends, local.target[at_ends] - guess[len(span) :])
         values = np.einsum("nij,nj->ni", local.R_lab_local[rows], inside) + local.centre[rows]
-        error = drift(local.frames[local.seen], residual, gap, ends, STRAIN) * (1 + float(lost.mean()))
-        error *= _beyond(around[: len(span)], inverse, gram)
+        error = np.nan
+        if residual is not None:
+            error = drift(local.frames[local.seen], residual, gap, ends, STRAIN) * (1 + float(lost.mean()))
+            error *= _beyond(around[: len(span)], inverse, gram)
         found[gap] = Fill(marker, gap.first, gap.last, "regression", 0.0, error), values
     return found
 
