@@ -13,7 +13,7 @@ import numpy as np
 from solver.body.model import Body
 from solver.rotations import exp_so3, right_jacobian_inverse, skew
 from solver.solve.kinematics import Chain, Points, Pose, blended_turn, forward, place_points, shape_jacobian
-from solver.solve.normal import NormalEquations, group_jacobian, groups
+from solver.solve.normal import NormalEquations, diagonal_blocks, group_jacobian, groups
 from solver.solve.residuals import (
     bias_residual,
     focal_residual,
@@ -137,10 +137,7 @@ class Problem:
         """What the markers say of their own places, and of the shape together with them."""
         transposed = by_place.transpose(1, 3, 0, 2).reshape(by_place.shape[1], 3, -1)  # (M, 3, F * 3)
         own = transposed @ np.swapaxes(transposed, 1, 2)
-        start = self.placement_at.start
-        for m, block in enumerate(own):
-            at = slice(start + 3 * m, start + 3 * m + 3)
-            sums.h_ss[at, at] += block
+        diagonal_blocks(sums.h_ss[None, self.placement_at, self.placement_at])[:, 0] += own
         target = scaled.transpose(1, 0, 2).reshape(len(own), -1, 1)
         sums.g_s[self.placement_at] += (transposed @ target).ravel()
         if by_shape is not None:
@@ -187,16 +184,16 @@ class Problem:
         by_habit = right_jacobian_inverse(habit)
         block += np.swapaxes(by_habit, -1, -2) @ (information[..., None] * by_habit)
         slope += (np.swapaxes(by_habit, -1, -2) @ (information * habit)[..., None])[..., 0]
-        for k in range(len(FREE)):
-            sums.h_ff[:, 3 * k : 3 * k + 3, 3 * k : 3 * k + 3] += block[:, k]
+        diagonal_blocks(sums.h_ff)[:-1] += block.swapaxes(0, 1)
         sums.g_f[:, :-3] += slope.reshape(len(slope), -1)
-        by_bias = -np.swapaxes(by_turn, -1, -2)
-        for k in range(1, len(FREE)):
-            at = slice(self.bias_at.start + 3 * k, self.bias_at.start + 3 * k + 3)
-            weighted = trust[:, k, None, None] * by_bias[:, k]
-            sums.h_fs[:, 3 * k : 3 * k + 3, at] += np.swapaxes(by_turn[:, k], -1, -2) @ weighted
-            sums.h_ss[at, at] += np.einsum("nia,nib->ab", by_bias[:, k], weighted)
-            sums.g_s[at] += np.einsum("nia,ni->a", weighted, video[:, k])
+        if weights.free_bias:
+            by_bias = -np.swapaxes(by_turn, -1, -2)
+            weighted = trust[..., None, None] * by_bias
+            cross = (np.swapaxes(by_turn, -1, -2) @ weighted).swapaxes(0, 1)
+            diagonal_blocks(sums.h_fs[..., self.bias_at])[1:] += cross[1:]
+            own = np.einsum("nkia,nkib->kab", by_bias, weighted)
+            diagonal_blocks(sums.h_ss[None, self.bias_at, self.bias_at])[1:, 0] += own[1:]
+            sums.g_s[self.bias_at][3:] += np.einsum("nkia,nki->ka", weighted, video)[1:].ravel()
         turn_at = slice(self.camera_at.start, self.camera_at.start + 3)
         by_camera = -by_turn[:, 0] @ np.swapaxes(state.pose.rotations[:, 0], -1, -2)
         weighted = trust[:, 0, None, None] * by_camera
@@ -213,11 +210,10 @@ class Problem:
         sums.h_ss[self.bias_at, self.bias_at] += bias * np.eye(3 * len(FREE))
         sums.g_s[self.bias_at] += bias * bias_residual(state).ravel()
         height = height_residual(state, surface, weights)
-        for m, normal in enumerate(surface.normal):
-            start = self.placement_at.start + 3 * m
-            at = slice(start, start + 3)
-            sums.h_ss[at, at] += np.outer(normal, normal) / weights.offset_spread**2 + np.eye(3) / weights.slide**2
-            sums.g_s[at] += normal * height[m] / weights.offset_spread**2
+        normal = surface.normal
+        own = normal[:, :, None] * normal[:, None] / weights.offset_spread**2 + np.eye(3) / weights.slide**2
+        diagonal_blocks(sums.h_ss[None, self.placement_at, self.placement_at])[:, 0] += own
+        sums.g_s[self.placement_at] += (normal * height[:, None]).ravel() / weights.offset_spread**2
 
     def _free(self, weights: Weights) -> np.ndarray:
         """Indices of the shared unknowns that may move."""
