@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -53,6 +53,7 @@ class Results:
     ----------
     store : where they are
     memory : bytes of arrays that are kept; the one asked for last always is
+    prepare : called in the background with what is loaded ahead, before it counts as loaded
 
     Attributes
     ----------
@@ -60,8 +61,11 @@ class Results:
     failed : emitted by ``poll`` with one that could not be, twice
     """
 
-    def __init__(self, store: Store, memory: int = _MEMORY) -> None:
+    def __init__(
+        self, store: Store, memory: int = _MEMORY, prepare: Callable[[Ref, Any], None] = lambda ref, value: None
+    ) -> None:
         self.store = store
+        self._prepare = prepare
         self.loaded: Signal[[Ref]] = Signal()
         self.failed: Signal[[Unread]] = Signal()
         self._memory = memory
@@ -195,7 +199,7 @@ class Results:
                 return
             if self._pool is None:
                 self._pool = ThreadPoolExecutor(1, thread_name_prefix="results")
-            self._coming[ref] = self._pool.submit(self._load, ref)
+            self._coming[ref] = self._pool.submit(self._load, ref, self._prepare)
 
     def _count(self, ref: Ref, error: BaseException) -> Unread | None:
         """Note that a result could not be loaded; what there is to tell of it, once, when it has been tried twice."""
@@ -214,8 +218,10 @@ class Results:
         why = refused.strerror if isinstance(refused, OSError) and refused.strerror else str(refused)
         return Unread(ref, f"it cannot be read: {why or type(refused).__name__}", False)
 
-    def _load(self, ref: Ref) -> Any:
+    def _load(self, ref: Ref, prepare: Callable[[Ref, Any], None] | None = None) -> Any:
         value = self.store.get(ref.stage, ref.key, result_type(ref.stage))
+        if prepare is not None:
+            prepare(ref, value)
         entry = self.entry(ref.stage, ref.key)
         with self._lock:
             self._held[ref] = value, entry.size if entry else 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -107,11 +107,13 @@ class StageBoard:
     results : of the session, whatever their settings; another object for another session
     compared : results that are shown beside those in force
     problem : why the stages cannot be run, None if they can
+    prepare : called in the background with a result that is loaded ahead, before it counts as loaded
     """
 
     def __init__(self, document: Document) -> None:
         self.document = document
         self.changed: Signal[[]] = Signal()
+        self.prepare: Callable[[Ref, Any], None] = lambda ref, value: None
         self.results = Results(Store(Path()))
         self.compared: set[Ref] = set()
         self.problem: InputError | None = None
@@ -231,7 +233,7 @@ class StageBoard:
             self.compared, self._failures, self._running = set(), {}, None
             self.keys, self.sources, self.settings, self.graph, self.problem = {}, {}, {}, (), None
             folder = self.document.folder if self.document.is_open else Path()
-            self.results = Results(Store(folder / "results"))
+            self.results = Results(Store(folder / "results"), prepare=lambda ref, value: self.prepare(ref, value))
         if self.document.is_open:
             self._derive(self.document.session)
         self.changed.emit()

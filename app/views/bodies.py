@@ -59,6 +59,11 @@ class BodyTrack:
         """(U) the vertex below each marker."""
         return skin_points(self.body, self.betas, self.vertex)
 
+    def ready(self) -> BodyTrack:
+        """This, with every skin made now and not when it is first drawn."""
+        _ = self.coarse, self.full, self.skin
+        return self
+
     def nearest(self, time: float) -> int:
         """The pose whose time is nearest."""
         right = int(np.clip(np.searchsorted(self.times, time), 1, max(len(self.times) - 1, 1)))

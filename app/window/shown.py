@@ -42,6 +42,8 @@ class Shown:
         self._made: dict[str, tuple[Any, Any]] = {}
         self._bodies: dict[Path | None, Body] = {}
         self._coming: threading.Thread | None = None
+        self._posed: tuple[FittedMotion, BodyTrack] | None = None
+        bench.board.prepare = self._prepare
         bench.board.changed.connect(self.follow)
         bench.document.changed.connect(self._begin_anew)
 
@@ -176,7 +178,17 @@ class Shown:
         motion = self.get("fit")
         if motion is None:
             return None
-        return self.once("track", (motion,), lambda: bodies.of_motion(self.body, motion))
+        return self.once("track", (motion,), lambda: self._track_of(motion))
+
+    def _track_of(self, motion: FittedMotion) -> BodyTrack:
+        posed = self._posed
+        return posed[1] if posed is not None and posed[0] is motion else bodies.of_motion(self.body, motion)
+
+    def _prepare(self, ref: Ref, value: Any) -> None:
+        """In the background: the skins of a fit, whose making takes as long as a picture may."""
+        if ref.stage == "fit":
+            with suppress(Exception):  # whoever draws it hears why
+                self._posed = value, bodies.of_motion(self.body, value).ready()
 
     @property
     def clusters(self) -> Any:

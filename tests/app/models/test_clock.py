@@ -196,7 +196,8 @@ def test_playing_shows_what_seeking_shows(seconds: float, speed: float, jitter: 
     playing.tick(50.0 + seconds / speed * 0.4 + jitter)
     playing.tick(50.0 + seconds / speed)
     playing.stop()
-    sought.seek(min(2.0 + seconds, 5.0))
+    assert playing.time == pytest.approx(min(2.0 + seconds, 5.0), abs=1e-9)
+    sought.seek(playing.time)  # to the last bit: half-way between two frames it decides
     assert (playing.marker_frame, playing.video_frame) == (sought.marker_frame, sought.video_frame)
 
 
