@@ -195,9 +195,9 @@ def test_playing_shows_what_seeking_shows(seconds: float, speed: float, jitter: 
     playing.tick(50.0)
     playing.tick(50.0 + seconds / speed * 0.4 + jitter)
     playing.tick(50.0 + seconds / speed)
-    playing.stop()
     assert playing.time == pytest.approx(min(2.0 + seconds, 5.0), abs=1e-9)
     sought.seek(playing.time)  # to the last bit: half-way between two frames it decides
+    playing.stop()
     assert (playing.marker_frame, playing.video_frame) == (sought.marker_frame, sought.video_frame)
 
 
