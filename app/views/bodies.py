@@ -60,7 +60,7 @@ class BodyTrack:
         return skin_points(self.body, self.betas, self.vertex)
 
     def ready(self) -> BodyTrack:
-        """This, with every skin made now and not when it is first drawn."""
+        """Make every skin now and not when it is first drawn; the same track."""
         _ = self.coarse, self.full, self.skin
         return self
 

@@ -118,7 +118,10 @@ def hypotheses_picture(
             )
         )
     highest = max((sum(term.value for term in card.terms) for card in cards), default=0.0)
-    return HypothesesPicture(tuple(cards), highest, _sentence(ranked))
+    sentence = _sentence(ranked)
+    if in_use is not None and in_use not in rows and in_use < len(ranked.candidates):
+        sentence += f" The fit goes on from candidate {in_use + 1}, which the search had left behind."
+    return HypothesesPicture(tuple(cards), highest, sentence)
 
 
 def _energies(own: Candidate, solved: PaperSolve | None) -> dict[str, float]:

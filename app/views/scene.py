@@ -13,6 +13,9 @@ from app.views.tracks import MarkerTracks
 from solver.segment import Segmentation
 from solver.solve.results import FittedMotion
 
+_NEAR_M, _REACH_M = 0.1, 0.2
+"""How far a marker may be out of where nearly all are, and how far the body reaches beyond its joints."""
+
 
 @dataclass(frozen=True, eq=False)
 class Lines:
@@ -104,10 +107,31 @@ def middle(tracks: MarkerTracks, frame: int) -> np.ndarray:
 
 def extent(tracks: MarkerTracks, most: int = 400) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest corner (3,) m of where the markers are over the session, less the odd ghost."""
-    frames = np.unique(np.linspace(0, len(tracks.state) - 1, min(len(tracks.state), most)).round().astype(int))
-    points = tracks.markers.positions[frames].reshape(-1, 3)
-    points = points[np.isfinite(points).all(axis=1)]
+    points = _over_the_session(tracks, most)
     if not len(points):
         return np.zeros(3), np.zeros(3)
     low, high = np.percentile(points, [0.5, 99.5], axis=0)
     return low, high
+
+
+def outline(tracks: MarkerTracks, track: BodyTrack | None = None, most: int = 60) -> np.ndarray:
+    """(N, 3) m, what a picture of the whole session has to show: the markers, less the odd ghost, and the body."""
+    low, high = extent(tracks)
+    points = _over_the_session(tracks, most)
+    points = points[((points >= low - _NEAR_M) & (points <= high + _NEAR_M)).all(axis=1)]
+    if track is None:
+        return points
+    frames = _spread(len(track.times), most)
+    joints = track.body.pose(track.rotations[frames], track.betas, track.trans[frames], want_vertices=False)[1]
+    reach = np.array([[0.0, 0.0, _REACH_M], [0.0, 0.0, -_REACH_M]])  # the crown above, the soles below
+    return np.concatenate([points, (joints.reshape(-1, 1, 3) + reach).reshape(-1, 3)])
+
+
+def _over_the_session(tracks: MarkerTracks, most: int) -> np.ndarray:
+    """(N, 3) m, where markers are in some frames."""
+    points = tracks.markers.positions[_spread(len(tracks.state), most)].reshape(-1, 3)
+    return points[np.isfinite(points).all(axis=1)]
+
+
+def _spread(count: int, most: int) -> np.ndarray:
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))

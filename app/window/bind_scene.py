@@ -36,6 +36,7 @@ class SceneBinder:
         self.widget, self.bench, self.shown, self.ghosts = widget, bench, shown, ghosts
         self.clusters: np.ndarray | None = None
         self._framed = False
+        self._own_view: dict[str, Any] | None = None
         self._body: tuple[object, ...] | None = None
         self._legend: tuple[Legend, tuple[tuple[str, RGB], ...]] | None = None
         self._ghost_layers: set[str] = set()
@@ -161,7 +162,7 @@ class SceneBinder:
         self._ghost_layers = set()
 
     def _opened(self) -> None:
-        self._framed = False
+        self._framed, self._own_view = False, None
         self.clusters = None
         if not self.bench.document.is_open:
             self._clear()
@@ -175,7 +176,7 @@ class SceneBinder:
             return
         if stages & {"markers", "clean"}:
             self._names()
-            lowest, highest = scene.extent(tracks)
+            lowest = scene.extent(tracks)[0]
             self.widget.set_floor(0.0 if -0.3 < lowest[2] < 0.5 else float(lowest[2]))
         track = self.shown.track
         if "fit" in stages and track is not None:
@@ -186,9 +187,19 @@ class SceneBinder:
             if isinstance(state, dict):
                 self.widget.restore_camera(state)
             else:
-                lowest, highest = scene.extent(tracks)
-                self.widget.view_from("isometric")
-                self.widget.frame(np.stack([lowest, highest, [*lowest[:2], highest[2]], [*highest[:2], lowest[2]]]))
+                self._look_at(scene.outline(tracks, track))
+        elif "fit" in stages and track is not None and self._own_view == self._view():
+            # The body reaches beyond the markers, and now it is known which way it faces.
+            self._look_at(scene.outline(tracks, track))
+
+    def _look_at(self, points: np.ndarray) -> None:
+        """See all of them, from before the person where that is known."""
+        self.widget.view_from("isometric")
+        self.widget.frame(points)
+        self._own_view = self._view()
+
+    def _view(self) -> dict[str, Any]:
+        return {name: value for name, value in self.widget.camera_state().items() if name != "facing"}
 
     def _display(self, names: frozenset[str]) -> None:
         display = self.bench.display

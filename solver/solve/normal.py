@@ -130,7 +130,7 @@ class NormalEquations:
 
 
 def diagonal_blocks(matrices: np.ndarray) -> np.ndarray:
-    """A view (K, F, 3, 3) of the blocks along the diagonals of matrices (F, at least 3K, 3K): what is 3 by 3 of each."""
+    """A view (K, F, 3, 3) of the 3 by 3 blocks along the diagonals of matrices (F, at least 3K, 3K)."""
     frames, _, size = matrices.shape
     across, down, along = matrices.strides
     shape, strides = (size // 3, frames, 3, 3), (3 * (down + along), across, down, along)

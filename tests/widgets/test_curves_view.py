@@ -7,18 +7,21 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QColor, QImage, QPainter
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel
 
 from tests.widgets.drawn import distance, pixels
 from widgets import palette, theme
 from widgets.gallery_panels import hypotheses
+from widgets.images import to_rgb
 from widgets.panels.energy_bars import EnergyBar
 from widgets.panels.hypotheses import HypothesesView
 from widgets.panels.transport import Readout, Transport
 from widgets.plots.angle_data import AngleCurve, AnglePlot
 from widgets.plots.convergence import ConvergenceView, EnergyCurve
 from widgets.plots.curves import CurvesView
+from widgets.plots.ink import pen, polyline
 
 TIME = np.arange(400) / 100
 
@@ -281,3 +284,19 @@ def test_the_convention_and_the_joint_of_a_bone_are_shown(curves: CurvesView, qa
     assert np.array_equal(pixels(curves.plots), before)
     curves.tree.itemClicked.emit(curves.tree.topLevelItem(1), 0)
     assert joints == ["knee"]
+
+
+@pytest.mark.parametrize("count", [40, 700, 1400])
+def test_a_dashed_line_has_gaps_and_a_solid_one_none_however_many_points(qapp: QApplication, count: int) -> None:
+    def covered(dashed: bool) -> np.ndarray:
+        image = QImage(420, 60, QImage.Format.Format_RGB888)
+        image.fill(QColor(255, 255, 255))
+        painter = QPainter(image)
+        painter.setPen(pen((0, 0, 0), 1.6, dashed))
+        polyline(painter, np.linspace(10, 410, count), np.full(count, 30.0))
+        painter.end()
+        return (to_rgb(image)[26:35, 12:408] < 160).any(axis=(0, 2))
+
+    assert covered(False).all(), f"gaps in a solid line of {count} points"
+    share = covered(True).mean()
+    assert 0.35 < share < 0.8, f"{share:.0%} of a dashed line of {count} points is drawn"

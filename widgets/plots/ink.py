@@ -18,6 +18,8 @@ _CONTRAST = 3.0
 """What WCAG asks of lines and signs."""
 _PIECE = 32
 """Points of a solid line drawn at once: Qt's time for a smoothed line grows with the square of them."""
+_DASH, _GAP, _CLOSE = 5.0, 4.0, 2.5
+"""Pixels along the clock of a dash and of the gap behind it, where points lie closer than the third."""
 _DENSE = 1000
 """Points beyond which a line is thin and not smoothed: it is an envelope then, and Qt's wide joins would cost 20 ms."""
 
@@ -69,6 +71,9 @@ def polyline(painter: QPainter, x: np.ndarray, y: np.ndarray) -> None:
     dense = len(x) > _DENSE
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, not dense)
     drawn_with = painter.pen()
+    if drawn_with.style() != Qt.PenStyle.SolidLine and len(x) > 1 and abs(x[-1] - x[0]) < _CLOSE * len(x):
+        good &= (x - x[0]) % (_DASH + _GAP) < _DASH  # Qt's own dashes of a long line take as long as a whole picture
+        drawn_with.setStyle(Qt.PenStyle.SolidLine)
     drawn_with.setJoinStyle(Qt.PenJoinStyle.BevelJoin)  # looks the same on so narrow a line, in half the time
     if dense:
         drawn_with.setWidthF(1.0)

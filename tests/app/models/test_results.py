@@ -61,6 +61,22 @@ def test_one_result_is_kept_however_large(store: Store) -> None:
     assert results.is_loaded("sync", "key0")
 
 
+def test_what_is_loaded_ahead_is_prepared_in_the_background_before_it_counts_as_loaded(store: Store) -> None:
+    begun, go_on, prepared = threading.Event(), threading.Event(), []
+
+    def prepare(ref: Ref, value: Sync) -> None:
+        begun.set()
+        go_on.wait(5)
+        prepared.append((ref.key, value.offset, threading.current_thread() is threading.main_thread()))
+
+    results = Results(store, prepare=prepare)
+    results.load_ahead("sync", "key2")
+    assert begun.wait(5) and not results.is_loaded("sync", "key2")
+    go_on.set()
+    assert results.get("sync", "key2").offset == 2.0
+    assert prepared == [("key2", 2.0, False)]
+
+
 def test_loading_ahead_tells_the_thread_that_polls(store: Store) -> None:
     results, told = Results(store), []
     results.loaded.connect(lambda ref: told.append((ref, threading.current_thread())))

@@ -9,7 +9,7 @@ import pytest
 
 from app.views.bodies import of_motion
 from app.views.colours import by_bone, by_cluster, by_residual, by_selection, by_state
-from app.views.scene import extent, markers_at, middle, misses, ties, trails
+from app.views.scene import extent, markers_at, middle, misses, outline, ties, trails
 from app.views.tracks import FILLED, LOST, MEASURED, OUTLIER, pooled, tracks_of
 from solver.clean.clean import Cut
 from solver.markers import Markers
@@ -155,3 +155,14 @@ def test_the_middle_and_the_extent_ignore_the_lost_and_the_odd(made: Made) -> No
     nothing = tracks_of(replace(made.markers, positions=np.full((2, 3, 3), np.nan)))
     assert np.isnan(middle(nothing, 0)).all()
     assert not extent(nothing)[1].any()
+    assert len(outline(nothing)) == 0
+    assert np.abs(outline(tracks, most=500)).max() == 3.0, "the ghost is not looked at"
+
+
+def test_the_outline_holds_the_body_from_crown_to_sole(made: Made) -> None:
+    track = of_motion(made.body, made.motion)
+    points = outline(tracks_of(made.markers, made.motion), track)
+    seen = np.concatenate([track.vertices(float(time)) for time in made.motion.time[::20]])
+    missed = np.maximum(seen.max(axis=0) - points.max(axis=0), points.min(axis=0) - seen.min(axis=0))
+    assert missed.max() < 0.12, f"the body reaches {missed} m beyond what is framed"
+    assert missed[2] < 0.02, "neither crown nor soles are cut off"
