@@ -53,7 +53,7 @@ class CandidateRow:
     heading_deg : degrees, which way the camera looks about the vertical; NaN if unknown
     distance : mm, root mean square from the markers to the body before any pose is changed; NaN if not laid over
     score : what it is ranked by, see ``CandidateTable.score``; NaN if not scored
-    margin : score over the best one of the same fate, 1 for that; NaN if not scored
+    margin : score over the best one's, 1 for that; NaN if not scored, or scored on other frames than the best
     covered : share 0..1 of the markers that are near the body, see ``coverage``; NaN where nobody asked
     same_as_first : whether it is the first candidate's answer found once more
     in_use : whether the fit goes on from it
@@ -206,7 +206,8 @@ def _of_hypotheses(
 def _relaxed(row: CandidateRow, ranked: Orientation) -> CandidateRow:
     """The row of a candidate as the orientation has it."""
     own = ranked.candidates[row.candidate]
-    best = next(c for c in ranked.candidates if c.refined == own.refined)
+    best = ranked.candidates[0]
+    comparable = own.refined == best.refined
     return replace(
         row,
         fate="refined" if own.refined else "left behind",
@@ -214,7 +215,7 @@ def _relaxed(row: CandidateRow, ranked: Orientation) -> CandidateRow:
         bones=bone_names(own.bone),
         heading_deg=own.heading_deg,
         score=own.energy,
-        margin=own.energy / max(best.energy, 1e-12),
+        margin=own.energy / max(best.energy, 1e-12) if comparable else float("nan"),
         can_pin=True,
         same_as_first=row.candidate > 0 and own.refined and same_answer(ranked.candidates[0], own),
     )

@@ -23,6 +23,8 @@ from widgets.plots.scales import HEADING, degrees, figure
 from widgets.tables.array_table import ArrayTable
 from widgets.tables.columns import Column
 
+MARGIN = "Score over that of the best: near 1 they tie. None where the two were not scored on the same frames"
+
 
 @dataclass(frozen=True)
 class CandidateRecord:
@@ -83,7 +85,7 @@ def candidate_columns(
             tips=[", ".join(row.bones) for row in rows],
         ),
         Column(score, figures("score"), unit, figure, meaning or "What the candidates are ranked by, the least first"),
-        Column("Margin", figures("margin"), "× best", ".2f", "Score over that of the best: near 1 they tie"),
+        Column("Margin", figures("margin"), "× best", ".2f", MARGIN),
         Column("Markers", figures("covered", 100), "%", ".0f", "Share of the markers that it explains", bar=(0, 100)),
         Column("Camera heading", figures("heading_deg"), "°", degrees, HEADING),
         Column("Start yaw", figures("yaw_deg"), "°", degrees, "Turn about the vertical that it was started from"),

@@ -52,7 +52,7 @@ def test_every_hypothesis_meets_its_fate(results: Mapping[str, Any]) -> None:
     assert table.rows[0].margin == 1.0 and table.rows[0].covered == 0.75
     assert [row.candidate for row in table.rows if row.in_use] == [1]
     behind = [row for row in table.rows if row.fate == "left behind"]
-    assert not behind or (behind[0].margin == 1.0 and all(row.margin >= 1 for row in behind))
+    assert all(np.isnan(row.margin) for row in behind), "scored on few keyframes, they cannot be compared with the best"
 
 
 def test_what_ran_into_a_better_one_comes_last(results: Mapping[str, Any]) -> None:
