@@ -48,17 +48,15 @@ def _keep(bench: Workbench, asks: Asks) -> None:
     """Put back what was cut of the selected markers: in the range, or else the stretch at or next to this frame."""
     cleaned = bench.board.current["clean"]
     mask = cleaned.outliers.mask(cleaned.markers.positions.shape[:2])
-    edited = 0
-    for marker in sorted(bench.selection.markers):
-        cut = np.flatnonzero(mask[:, marker])
-        found = _stretch(bench, cut)
-        if found is not None:
-            labels = bench.board.current["markers"].labels
-            edit = clean_edits.keep_samples(bench.document.session, marker, *found, labels)
-            bench.document.apply(edit)
-            edited += 1
-    if not edited:
+    stretches = {
+        marker: found
+        for marker in sorted(bench.selection.markers)
+        if (found := _stretch(bench, np.flatnonzero(mask[:, marker]))) is not None
+    }
+    if not stretches:
         raise InputError("nothing was cut of the selected markers there", "what was cut", "click on a cut frame first")
+    labels = bench.board.current["markers"].labels
+    bench.document.apply(clean_edits.keep_samples(bench.document.session, stretches, labels))
 
 
 def _stretch(bench: Workbench, cut: np.ndarray) -> tuple[int, int] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from app.models.edits import Edit, decide
 from solver.clean.swaps import Proposal
@@ -17,10 +17,16 @@ def accept(session: Session, proposal: Proposal) -> Edit:
     return Edit(proposal.sentence.rstrip("."), _add(session, "swaps" if proposal.kind == "swap" else "joins", row))
 
 
-def keep_samples(session: Session, marker: int, first: int, last: int, labels: Sequence[str]) -> Edit:
-    """Keep a marker's samples from one frame to another, both included, whatever they look like."""
-    after = _add(session, "keep", (int(marker), int(first), int(last)))
-    return Edit(f"{labels[marker]} kept as measured in frames {first} to {last}", after)
+def keep_samples(session: Session, stretches: Mapping[int, tuple[int, int]], labels: Sequence[str]) -> Edit:
+    """Keep samples of some markers, each from one frame to another, both included, whatever they look like."""
+    after = session
+    for marker, (first, last) in stretches.items():
+        after = _add(after, "keep", (int(marker), int(first), int(last)))
+    if len(stretches) == 1:
+        ((marker, (first, last)),) = stretches.items()
+        return Edit(f"{labels[marker]} kept as measured in frames {first} to {last}", after)
+    first, last = min(first for first, _ in stretches.values()), max(last for _, last in stretches.values())
+    return Edit(f"{len(stretches)} markers kept as measured between frames {first} and {last}", after)
 
 
 def _add(session: Session, name: str, row: tuple[int, ...]) -> Session:

@@ -214,8 +214,16 @@ def test_proposed_edits_of_tracks_are_made_once() -> None:
     join = Proposal("join", 10, 20, (1, 7), 0.1, "h goes on as b.")
     session = clean_edits.accept(EMPTY, swap).session
     session = clean_edits.accept(session, join).session
-    session = clean_edits.keep_samples(session, 3, 4, 8, LABELS).session
+    session = clean_edits.keep_samples(session, {3: (4, 8)}, LABELS).session
     assert clean_edits.accept(session, swap).session == session
     assert clean_edits.accept(session, swap).sentence == "c and f exchange from frame 30 on"
     found = stage(session, "clean")
     assert (found.swaps, found.joins, found.keep) == (((2, 5, 30),), ((1, 7, 10, 20),), ((3, 4, 8),))
+
+
+def test_samples_of_several_markers_are_put_back_in_one_step() -> None:
+    edit = clean_edits.keep_samples(EMPTY, {3: (4, 8), 5: (2, 6)}, LABELS)
+    assert stage(edit.session, "clean").keep == ((3, 4, 8), (5, 2, 6))
+    assert edit.sentence == "2 markers kept as measured between frames 2 and 8"
+    one = clean_edits.keep_samples(EMPTY, {3: (4, 8)}, LABELS)
+    assert one.sentence == "d kept as measured in frames 4 to 8"
