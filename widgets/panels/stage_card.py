@@ -152,9 +152,8 @@ class StageCard(QFrame):
         for button, what in ((self.run_button, alone), (self.run_to_button, down)):
             button.setEnabled(not data.why_not)
             button.setToolTip(data.why_not or what)
-        self.form.set_fields(data.fields)
-        self.form.setVisible(bool(data.fields))
-        self._show_earlier(data.earlier)
+        if self.is_open():
+            self._fill_details()
         self._paint()
 
     def set_progress(self, progress: StageProgress) -> None:
@@ -189,7 +188,15 @@ class StageCard(QFrame):
                 self._show_earlier(results)
         super().changeEvent(event)
 
+    def _fill_details(self) -> None:
+        """Settings and earlier results; only of an open card, since all of them take longer than a picture may."""
+        self.form.set_fields(self._data.fields)
+        self.form.setVisible(bool(self._data.fields))
+        self._show_earlier(self._data.earlier)
+
     def _open(self, on: bool) -> None:
+        if on:
+            self._fill_details()
         self._details.setVisible(on)
         self.toggle.setIcon(icon("up" if on else "down"))
         self.toggle.setToolTip("Hide the settings" if on else "Show the settings and earlier results")
