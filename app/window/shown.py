@@ -92,8 +92,19 @@ class Shown:
         self.follow()
 
     def get(self, stage: str) -> Any:
-        """A stage's latest result, None where there is none (yet)."""
-        return self._values.get(stage)
+        """A stage's latest result, None where there is none (yet), or only one of other markers than there are now."""
+        value = self._values.get(stage)
+        return value if value is not None and self._of_these_markers(stage, value) else None
+
+    def _of_these_markers(self, stage: str, value: Any) -> bool:
+        """Whether a result speaks of no marker, and no keyframe, that is not there: the file may have changed."""
+        if stage not in ("localize", "fit") or (markers := self.markers) is None:
+            return True
+        frames, count = markers.positions.shape[:2]
+        if stage == "fit":
+            return bool(value.residual.shape[1] == count)
+        keyframes = value.many if hasattr(value, "many") else value.frames
+        return bool(value.markers.max(initial=-1) < count and keyframes.max(initial=-1) < frames)
 
     def stale(self, stage: str) -> bool:
         """Whether what is shown of a stage is not what the settings ask for."""

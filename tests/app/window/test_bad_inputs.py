@@ -15,6 +15,9 @@ from app.cli_commands import DEMO_MARKERS
 from app.models import edits
 from app.models.imports import new_session
 from app.window.main import MainWindow
+from solver.io.export_csv import write_markers_csv
+from solver.io.markers_in import load_markers
+from solver.markers import Markers
 from solver.pipeline.session import InputFile, Session, save_session
 
 Spin = Callable[..., None]
@@ -112,6 +115,26 @@ def test_a_video_that_is_gone_when_its_session_is_opened_again(
     states = {name: window.bench.board.state(name) for name in window.bench.board.names}
     assert set(states.values()) == {"cached"}, f"nothing has to be computed again: {states}"
     spin(lambda: window.shown.track is not None, "the fit")
+
+
+def test_a_marker_file_that_has_other_markers_than_the_results_speak_of(
+    open_window: Callable[..., MainWindow], spin: Spin, session: Session, tmp_path: Path
+) -> None:
+    markers = load_markers(session.inputs["marker_file"].path)
+    few = tmp_path / "few.csv"
+    write_markers_csv(few, Markers(markers.positions[:, :7], markers.rate, markers.labels[:7]))
+    save_session(replace(session, inputs={**session.inputs, "marker_file": InputFile(few)}))
+    window = open_window()
+    window.open_path(session.folder)
+    spin(lambda: window.shown.markers is not None, "the markers")
+    window.bench.selection.select(candidate=1)
+    for name in window.docks.docks:
+        window.raise_dock(name)
+        spin()
+    spin(lambda: window.shown.get("angles") is not None, "what can still be shown")
+    assert not window.messages.messages(), "nothing that is shown counts on markers that are gone"
+    assert window.shown.markers is not None and window.shown.markers.positions.shape[1] == 7
+    assert window.shown.track is None and window.bench.board.state("fit") == "stale"
 
 
 def test_places_that_cannot_be_written_to(
