@@ -41,7 +41,7 @@ COMMANDS = {
     "clean": "cut outliers and fill gaps of a marker file, every change listed",
     "bench": "how good the methods are on synthetic sessions whose truth is known",
     "synth": "make a session whose truth is known, as files",
-    "train": "train the network for a layout: a session's own, or one with a name",
+    "train": "train a network for a layout: a session's own, or one with a name",
     "dataset": "cut your own copy of a public dataset into sessions",
 }
 

@@ -18,6 +18,7 @@ def clean_options(clean: argparse.ArgumentParser) -> None:
 
     what = clean.add_argument_group("what is done")
     what.add_argument("--fill", choices=FILLINGS, help="how gaps are filled (default: regression)")
+    what.add_argument("--weights", type=Path, metavar="FILE", help="of the network that fills (--fill network)")
     what.add_argument("--max-gap", type=float, metavar="SECONDS", help="longer gaps stay (default: 5; inf: no limit)")
     what.add_argument("--min-confidence", type=float, metavar="C", help="less sure fillings are left (default: 0.2)")
     what.add_argument("--outliers", choices=OUTLIER_METHODS, help="how they are found (default: local)")

@@ -6,7 +6,7 @@ import argparse
 from dataclasses import fields
 from pathlib import Path
 
-from solver.neural.request import NAMED, TrainRequest
+from solver.neural.request import NAMED, NETWORKS, SIZES, TrainRequest
 
 
 def train_options(train: argparse.ArgumentParser) -> None:
@@ -16,6 +16,10 @@ def train_options(train: argparse.ArgumentParser) -> None:
 
     what = train.add_argument_group("what it learns")
     what.add_argument("--layout", metavar="NAME", help=f"for anybody with this layout instead: {', '.join(NAMED)}")
+    what.add_argument(
+        "--network", choices=NETWORKS, help="any layout's (default), or the published solver, or gap filler, of one"
+    )
+    what.add_argument("--size", choices=SIZES, help="of a published network (default: compact)")
     what.add_argument(
         "--motions", type=Path, nargs="+", default=(), metavar="FOLDER", help="of BVH files, AMC files and their ASF"
     )

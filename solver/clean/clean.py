@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from solver.clean.gaps import Fill, FillSettings, find_gaps
+from solver.clean.gaps import Fill, FillMethod, FillSettings, find_gaps
 from solver.clean.outliers import OutlierSettings, find_outliers
 from solver.clean.swaps import Proposal, find_proposals
 from solver.errors import InputError
@@ -77,10 +77,19 @@ class Cleaned:
     notes: tuple[str, ...]
 
 
-def clean(markers: Markers, settings: CleanSettings | None = None, progress: Progress = silent) -> Cleaned:
+def clean(
+    markers: Markers,
+    settings: CleanSettings | None = None,
+    progress: Progress = silent,
+    fill_by: FillMethod | None = None,
+) -> Cleaned:
     """Cut outliers, fill gaps, point out tracks that exchanged or broke.
 
     Measured samples stay as they are, to the bit, unless they are cut; lost ones stay lost where nothing can be known.
+
+    Parameters
+    ----------
+    fill_by : how gaps are filled, instead of by the method that the settings name
 
     Raises
     ------
@@ -104,14 +113,15 @@ def clean(markers: Markers, settings: CleanSettings | None = None, progress: Pro
     progress(0.2, "looking for exchanged tracks")
     proposals = find_proposals(without) if settings.tracks else ()
     fills: tuple[Fill, ...] = ()
+    notes: tuple[str, ...] = ()
     cleaned = without
     if settings.fill_gaps:
         progress(0.3, "filling gaps")
-        result = fill(without.positions, without.rate, settings.fill)
+        result = (fill_by or fill)(without.positions, without.rate, settings.fill)
         cleaned = replace(without, positions=result.positions, filled=(already & ~out) | result.filled)
-        fills = result.fills
+        fills, notes = result.fills, result.notes
     progress(1.0, "clean")
-    return Cleaned(cleaned, cut, fills, proposals, _notes(cleaned, cut, fills, proposals))
+    return Cleaned(cleaned, cut, fills, proposals, (*_notes(cleaned, cut, fills, proposals), *notes))
 
 
 def put_back(cleaned: Cleaned, outliers: bool = True, fills: bool = True) -> Markers:

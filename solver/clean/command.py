@@ -10,6 +10,7 @@ from pathlib import Path
 from solver import __version__
 from solver.clean.changes import changes_of, csv_of, lines_of
 from solver.clean.clean import Cleaned, CleanSettings, clean
+from solver.clean.fill.network import fill_by_weights
 from solver.clean.request import CleanRequest
 from solver.clean.swaps import apply_proposals
 from solver.errors import InputError
@@ -44,10 +45,11 @@ def clean_file(request: CleanRequest, progress: Progress = silent) -> Outcome:
         rate=request.marker_rate,
     ).between(*(request.range or (None, None)))
     settings = settings_of(request)
+    fill_by = None if request.weights is None else fill_by_weights(request.weights, markers)
     made: list[str] = []
     if request.apply:
         markers, made = _edited(markers, settings, request.apply)
-    cleaned = clean(markers, settings, part_of(progress, 0.1, 0.9))
+    cleaned = clean(markers, settings, part_of(progress, 0.1, 0.9), fill_by)
     progress(0.9, "writing")
     write_markers(request.out, cleaned.markers)
     changes = changes_of(cleaned) | {"edits_made": made}
@@ -56,6 +58,8 @@ def clean_file(request: CleanRequest, progress: Progress = silent) -> Outcome:
         "input": {"file": request.markers.name, "sha256": file_digest(request.markers)},
         "settings": _finite(asdict(settings)),
     }
+    if request.weights is not None:
+        about["weights"] = {"file": request.weights.name, "sha256": file_digest(request.weights)}
     listed = request.out.with_suffix(".changes.json")
     write_text_atomic(listed, json.dumps(about | changes, indent=1, allow_nan=False) + "\n")
     table = request.out.with_suffix(".changes.csv")
@@ -73,7 +77,7 @@ def settings_of(request: CleanRequest) -> CleanSettings:
     """The settings that a request means."""
     settings = CleanSettings()
     fill, outliers = settings.fill, settings.outliers
-    if request.fill is not None and request.fill != "none":
+    if request.fill is not None and request.fill != "none" and request.fill != "network":
         fill = replace(fill, method=request.fill)
     if request.max_gap is not None:
         fill = replace(fill, max_gap=None if math.isinf(request.max_gap) else request.max_gap)

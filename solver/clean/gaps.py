@@ -59,11 +59,13 @@ class Filled:
     positions : (T, M, 3) m, NaN where nothing can be known
     filled : (T, M) True where a position was filled
     fills : by marker, then by frame
+    notes : what is to be known of the way they were filled, one sentence each
     """
 
     positions: np.ndarray
     filled: np.ndarray
     fills: tuple[Fill, ...]
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,8 @@ from solver.pipeline.request import Units, Up
 Method = Literal["regression", "rigid", "edm", "pattern", "spline", "linear"]
 OutlierMethod = Literal["local", "prominence", "none"]
 Filling = Literal["regression", "rigid", "edm", "pattern", "spline", "linear", "none"]
+NETWORK = "network"
+"""A filling that needs weights, and so is no setting of a session."""
 
 SUFFIXES = (".c3d", ".trc", ".csv")
 """Formats that can be written."""
@@ -25,7 +27,8 @@ class CleanRequest:
     Attributes
     ----------
     markers, out : files; the second's ending says its format
-    fill : the method, ``none`` leaves gaps
+    fill : the method, ``none`` leaves gaps, ``network`` fills by the weights where that is better than the default
+    weights : of the network that fills gaps
     max_gap : s, longer gaps stay; infinite for no limit
     min_confidence : 0..1, gaps whose filling would be less sure stay
     outliers : how they are found
@@ -35,7 +38,8 @@ class CleanRequest:
 
     markers: Path
     out: Path
-    fill: Filling | None = None
+    fill: Filling | Literal["network"] | None = None
+    weights: Path | None = None
     max_gap: float | None = None
     min_confidence: float | None = None
     outliers: OutlierMethod | None = None
@@ -50,6 +54,10 @@ class CleanRequest:
         """Refuse what no cleaning can make sense of."""
         if self.out.suffix.lower() not in SUFFIXES:
             raise InputError("names no format that can be written", self.out, f"end it in {', '.join(SUFFIXES)}")
+        if self.fill == NETWORK and self.weights is None:
+            raise InputError("no weights are named", "--fill network", "add --weights FILE, as train writes them")
+        if self.weights is not None and self.fill != NETWORK:
+            raise InputError("weights are for --fill network alone", "--weights", "add --fill network, or leave it out")
         if self.max_gap is not None and not self.max_gap >= 0:
             raise InputError(f"{self.max_gap:g} is not possible", "--max-gap", "give seconds, 0 or above")
         if self.min_confidence is not None and not 0 <= self.min_confidence <= 1:
@@ -68,4 +76,4 @@ def parse_numbers(text: str) -> tuple[int, ...]:
         raise InputError(f'"{text}" is not understood', "--apply", "give numbers, for example 1,3") from error
 
 
-FILLINGS, OUTLIER_METHODS = get_args(Filling), get_args(OutlierMethod)
+FILLINGS, OUTLIER_METHODS = (*get_args(Filling), NETWORK), get_args(OutlierMethod)

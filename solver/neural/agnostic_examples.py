@@ -104,12 +104,13 @@ def one_layout(
 
 
 def one_person(
-    poses: Sampler, person: Marked, count: int, generator: Generator, spoiling: Spoiling = Spoiling()
+    poses: Sampler, person: Marked, count: int, generator: Generator, spoiling: Spoiling = Spoiling(), window: int = 1
 ) -> Task:
-    """Frames of one body with its markers, in poses of a sampler's."""
+    """Frames of one body with its markers, in poses of a sampler's; ``window`` of them at a time follow each other."""
     import torch
 
-    local, place = poses.poses(count, generator)
+    count = count // window * window
+    local, place = poses.poses(count // window, generator, window)
     joints, rest, weights = (
         torch.as_tensor(array, dtype=torch.float32).expand(count, *array.shape)
         for array in (person.joints, person.rest, person.weights)

@@ -12,6 +12,7 @@ from resources import resource
 from solver.body.skeleton import JOINTS
 from solver.errors import InputError
 from solver.neural.weights import Card, load_weights
+from solver.neural.weights import require_torch as require_torch
 from solver.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -74,7 +75,6 @@ def load(path: str | Path | None = None) -> Ready:
     """
     from solver.neural.agnostic import Agnostic, AgnosticSettings
 
-    require_torch()
     params, card = load_weights(SHIPPED if path is None else path, network=NETWORK)
     try:
         network = Agnostic(AgnosticSettings(**card.config["sizes"]))
@@ -84,19 +84,6 @@ def load(path: str | Path | None = None) -> Ready:
     if not wanted or wanted != {name: value.shape for name, value in params.items()}:
         raise InputError("holds the weights of another version of the network", path or SHIPPED, "train it again")
     return Ready(network, {name: value.float() for name, value in params.items()}, card)
-
-
-def require_torch() -> None:
-    """Say what is missing.
-
-    Raises
-    ------
-    InputError : torch is not there
-    """
-    try:
-        import torch  # noqa: F401
-    except ImportError as error:
-        raise InputError("networks need torch, which is not installed", None, "pip install torch") from error
 
 
 def solve_frames(ready: Ready, markers: np.ndarray, body: Marked, progress: Progress = silent) -> Solved:
@@ -137,10 +124,10 @@ def solve_frames(ready: Ready, markers: np.ndarray, body: Marked, progress: Prog
             rotations[first : first + len(part)] = local
             root[first : first + len(part)] = np.einsum("tij,tj->ti", R, found.root.numpy()) + t
     seen = np.isfinite(markers).all(axis=2).sum(axis=1) >= min(3, count)
-    return _held(Solved(rotations, root - body.joints[0], seen))
+    return held(Solved(rotations, root - body.joints[0], seen))
 
 
-def _held(solved: Solved) -> Solved:
+def held(solved: Solved) -> Solved:
     """Frames without markers as the frames beside them have it."""
     from solver.rotations import slerp
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from solver.body.skeleton import JOINTS
 from solver.neural.agnostic_solve import Marked, Ready
 from solver.neural.library import procedural_clips
 from solver.rotations import exp_so3, log_so3
+
+if TYPE_CHECKING:
+    from solver.neural.examples import Sampler
 
 _CLIPS, _FRAMES, _SECONDS = 24, 512, 4.0
 _UNLIKE = 5.0
@@ -43,14 +47,27 @@ def expected_errors(ready: Ready, body: Body, person: Marked, seed: int = 0) -> 
     import torch
 
     from solver.neural.agnostic_examples import Spoiling, one_person
-    from solver.neural.examples import ExampleSettings, Sampler, body_pool, generator
+    from solver.neural.examples import generator
 
-    clips = procedural_clips(_CLIPS, 1000 + seed, seconds=_SECONDS)
-    sampler = Sampler(clips, body_pool(body, 0, seed), ExampleSettings().plain())
-    task = one_person(sampler, person, _FRAMES, generator(seed), Spoiling(slide=5e-3, lost=0.05, far=0.0))
+    task = one_person(
+        made_poses(body, seed), person, _FRAMES, generator(seed), Spoiling(slide=5e-3, lost=0.05, far=0.0)
+    )
     with torch.no_grad():
         found = ready.network(ready.params, task.frames)[-1].local.numpy().astype(float)
-    off = log_so3(np.swapaxes(task.local.numpy().astype(float), -1, -2) @ found)
+    return spread_of_errors(found, task.local.numpy().astype(float))
+
+
+def made_poses(body: Body, seed: int = 0) -> Sampler:
+    """Made motions that no network has learnt from, to try one on."""
+    from solver.neural.examples import ExampleSettings, Sampler, body_pool
+
+    clips = procedural_clips(_CLIPS, 1000 + seed, seconds=_SECONDS)
+    return Sampler(clips, body_pool(body, 0, seed), ExampleSettings().plain())
+
+
+def spread_of_errors(found: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """(24, 3, 3) rad2 to be expected of a recording, from rotations (T, 24, 3, 3) found in made motions."""
+    off = log_so3(np.swapaxes(true, -1, -2) @ found)
     return np.asarray(_UNLIKE**2 * np.einsum("tja,tjb->jab", off, off) / len(off))
 
 

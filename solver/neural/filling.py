@@ -19,6 +19,7 @@ from solver.neural.layout import Layout
 from solver.neural.library import RATE
 from solver.neural.metrics import ompe
 from solver.neural.occlusion import WINDOW, Occlusion, corrected
+from solver.progress import Progress, silent
 
 if TYPE_CHECKING:
     from torch import Generator, Tensor
@@ -65,6 +66,16 @@ class Worth:
     default_cm: float
     hidden: int
     accepted: bool
+
+    @property
+    def sentence(self) -> str:
+        """What was found, in words."""
+        if not np.isfinite(self.network_cm + self.default_cm):
+            return f"Only {self.hidden} samples could be hidden to try the network on: the default filled the gaps."
+        return (
+            f"On {self.hidden} samples hidden on purpose the network is {10 * self.network_cm:.1f} mm off, the default "
+            f"{10 * self.default_cm:.1f} mm: the {'network' if self.accepted else 'default'} filled the gaps."
+        )
 
 
 def completed(positions: np.ndarray, rate: float, start: Method, layout: Layout, rest: np.ndarray) -> np.ndarray:
@@ -119,7 +130,7 @@ def fill_network(positions: np.ndarray, rate: float, settings: FillSettings, net
     usual = fill(positions, rate, replace(settings, method=FillSettings().method))
     judged = worth(positions, rate, network)
     if not judged.accepted:
-        return usual
+        return replace(usual, notes=(judged.sentence,))
     columns = network.layout.columns
     said = say(network, positions[:, columns], rate)
     better = judged.network_cm / max(judged.default_cm, 1e-9)
@@ -137,7 +148,7 @@ def fill_network(positions: np.ndarray, rate: float, settings: FillSettings, net
         else:
             kept = next(f for f in usual.fills if (f.marker, f.first) == (gap.marker, gap.first))
             parts.append((kept, usual.positions[span, gap.marker]))
-    return together(positions, parts, settings)
+    return replace(together(positions, parts, settings), notes=(judged.sentence,))
 
 
 def worth(
@@ -201,6 +212,7 @@ def fill_bank(
     start: Method = "edm",
     model: GapModel | None = None,
     shares: tuple[float, ...] = _SHARES,
+    progress: Progress = silent,
 ) -> FillBank:
     """Spans of motion with markers, hidden by the statistics, and filled by the method that the network starts from."""
     import torch
@@ -208,6 +220,7 @@ def fill_bank(
     rest_there = torch.as_tensor(rest, dtype=torch.float32)
     local, truth, visible = [], [], []
     for i in range(count):
+        progress(i / count, "filling recordings to learn from")
         markers = sampler.draw(layout, 1, generator(seed, i), frames).markers
         positions = markers.numpy().astype(float)
         hidden = draw_gaps(

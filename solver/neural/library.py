@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -115,6 +115,15 @@ def procedural_clips(n: int, seed: int, rate: float = RATE, seconds: float = 8.0
             made = act(name, body, betas, seconds=seconds, rate=rate, rng=rng)
             clips.append(_clip(made, f"{name} {i}", f"made {name}"))
     return tuple(clips)
+
+
+def motions_of(folders: Sequence[Path], made: int, seed: int) -> tuple[Clip, ...]:
+    """Recorded motions, each of a kind of its own, and made ones, of two kinds: they are many, and alike."""
+    recorded = load_library(folders) if folders else ()
+    return (
+        *(replace(clip, kind=clip.kind.partition(" ")[0]) for clip in procedural_clips(made, seed)),
+        *(replace(clip, kind=clip.name) for clip in recorded),
+    )
 
 
 def by_kind(clips: Sequence[Clip], held_out: Sequence[str]) -> tuple[tuple[Clip, ...], tuple[Clip, ...]]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +20,8 @@ from solver.neural.examples import Sampler
 from solver.neural.filling import completed
 from solver.neural.layers import Params
 from solver.neural.layout import Group, Layout
-from solver.neural.solving import FRAME_OF, Network
-from solver.neural.train import Trained, TrainSettings, train
+from solver.neural.solving import FRAME_OF, Network, members
+from solver.neural.train import Trained, TrainSettings, never, train
 from solver.neural.weights import Card, load_weights, save_weights
 from solver.progress import Progress, part_of, silent
 
@@ -89,41 +91,67 @@ def train_solver(
     start: Solver | None = None,
     checkpoint: Path | None = None,
     progress: Progress = silent,
+    enough: Callable[[], bool] = never,
 ) -> tuple[Solver, dict[Group, Trained]]:
     """Train what a layout needs: the body's network, and a hand's where its fingers carry markers.
+
+    Where it is stopped, a hand that was not begun has no network, and its fingers stay straight.
 
     Parameters
     ----------
     samplers : what is learnt from, and what is judged on
     settings : of the whole; hands take a tenth of steps and time each
     start : a solver of the same layout that is trained further, its networks as they are; ``choice`` says the rest
-    checkpoint : see ``train``; each network has its own beside it
+    checkpoint, enough : see ``train``; the hands' networks have checkpoints of their own beside the body's
     """
     groups = groups_of(layout, split=choice.split)
     shares = {group: 1 - _HAND_SHARE * (len(groups) - 1) if group == "body" else _HAND_SHARE for group in groups}
-    parts, results, done = [], {}, 0.0
+    motions = sha256(json.dumps([clip.name for clip in samplers[0].clips]).encode()).hexdigest()[:16]
+    parts: list[Part] = []
+    results: dict[Group, Trained] = {}
+    files: list[Path] = []
+    done = 0.0
     for group in groups:
+        if results and enough():
+            break
         task = make_task(body, layout, group, *samplers, choice)
         before = None if start is None else next((p for p in start.parts if p.group == group), None)
         if before is not None:
             task = replace(task, network=before.network)
         own = _share_of(settings, shares[group])
         own = replace(own, rate=settings.rate or RATES[task.network.kind])
-        beside = None if checkpoint is None else checkpoint.with_name(f"{checkpoint.stem}.{group}{checkpoint.suffix}")
-        what = f"{layout.digest} {group} {task.network.kind} {settings.seed}"
-        reporter = part_of(progress, done, done + shares[group])
-        params = task.network.initial(settings.seed) if before is None else before.params
-        found = train(params, task.loss, task.judge, own, checkpoint=beside, what=what, progress=reporter)
+        file = None
+        if checkpoint is not None:
+            file = checkpoint if group == "body" else checkpoint.with_name(f"{checkpoint.stem}.{group}.checkpoint")
+            files.append(file)
+        found = train(
+            task.network.initial(settings.seed) if before is None else before.params,
+            task.loss,
+            task.judge,
+            own,
+            checkpoint=file,
+            what=f"{layout.digest} {group} {task.network.kind} {settings.seed} {motions}",
+            progress=part_of(progress, done, done + shares[group]),
+            enough=enough,
+            keep=True,
+        )
         results[group] = found
         parts.append(Part(group, task.joints, task.chosen, task.network, found.params))
         done += shares[group]
+    if len(results) == len(groups) and not any(found.stopped for found in results.values()):
+        for file in files:
+            file.unlink(missing_ok=True)
     return Solver(layout, layout.rest(body), tuple(parts)), results
 
 
 def groups_of(layout: Layout, *, split: bool = True) -> tuple[Group, ...]:
     """The networks that a layout needs: fingers without a marker are not solved."""
     sides: tuple[tuple[str, Group], ...] = (("left", "left_hand"), ("right", "right_hand"))
-    hands = [group for side, group in sides if (layout.joint == INDEX[f"{side}_hand"]).sum() >= 2]
+    hands = [
+        group
+        for side, group in sides
+        if (layout.joint == INDEX[f"{side}_hand"]).sum() >= 2 and len(members(layout, group)) >= 3
+    ]
     return ("body", *hands) if split else ("body",)
 
 

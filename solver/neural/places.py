@@ -9,12 +9,13 @@ import numpy as np
 
 from solver.body.model import Body
 from solver.errors import InputError
+from solver.neural.layout import Layout
 from solver.neural.weights import Card
 
 _NEAR = 0.06
 """m on the mean body: a marker as far as this from a trained place is the same one, put on by another hand."""
 _SHARE = 0.8
-"""Of the markers that must have a trained place."""
+"""Of the session's markers that must have a trained place; where each place has weights of its own, of these."""
 
 
 def places_of(body: Body, vertex: np.ndarray) -> dict[str, Any]:
@@ -37,9 +38,8 @@ def check_places(card: Card, body: Body, vertex: np.ndarray, path: Path | None) 
     trained = card.config.get("places")
     if not trained:
         return
-    if trained["body"] != body.digest:
-        raise InputError("was trained on another body model", path, "solve with that body, or train on this one")
-    known = same_places(body, vertex, np.array(trained["vertex"], int))
+    check_body(trained["body"], body, path)
+    known = len(same_places(body, vertex, np.array(trained["vertex"], int))[0])
     if known < _SHARE * len(vertex):
         raise InputError(
             f"was trained for another layout: only {known} of these {len(vertex)} markers sit where its "
@@ -49,11 +49,44 @@ def check_places(card: Card, body: Body, vertex: np.ndarray, path: Path | None) 
         )
 
 
-def same_places(body: Body, vertex: np.ndarray, trained: np.ndarray) -> int:
-    """How many of the markers have a trained one near, each another."""
+def columns_of(body: Body, vertex: np.ndarray, layout: Layout, path: Path | None) -> np.ndarray:
+    """(L,) which of the markers each of a layout's is, -1 for one that there is none of.
+
+    Parameters
+    ----------
+    vertex : (M,) vertices below the markers that there are
+    path : of the weights, for the message
+
+    Raises
+    ------
+    InputError : the layout is another, or on another body
+    """
+    check_body(layout.body, body, path)
+    own, trained = same_places(body, vertex, layout.vertex)
+    if len(own) < _SHARE * len(layout):
+        raise InputError(
+            f"was trained for another layout: only {len(own)} of its {len(layout)} markers sit where these "
+            f"{len(vertex)} do",
+            path,
+            "train on this session, or leave --weights out",
+        )
+    columns = np.full(len(layout), -1, dtype=np.intp)
+    columns[trained] = own
+    return columns
+
+
+def check_body(trained: str, body: Body, path: Path | None) -> None:
+    """Refuse weights whose layout is on the vertices of a body of another digest."""
+    if trained != body.digest:
+        raise InputError("was trained on another body model", path, "solve with that body, or train on this one")
+
+
+def same_places(body: Body, vertex: np.ndarray, trained: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The markers that have a trained place near, each another, and these places: two rows of indices."""
     from scipy.optimize import linear_sum_assignment
     from scipy.spatial.distance import cdist
 
     apart = cdist(body.template[vertex], body.template[trained])
     rows, columns = linear_sum_assignment(np.minimum(apart, 10 * _NEAR))
-    return int((apart[rows, columns] < _NEAR).sum())
+    near = apart[rows, columns] < _NEAR
+    return rows[near], columns[near]

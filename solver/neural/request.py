@@ -5,11 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal, get_args
 
 from solver.errors import InputError
 
-NAMED = ("full_body", "body_53")
-"""Layouts that can be named: of ``solver.neural.layout``, those without fingers."""
+Network = Literal["agnostic", "graph", "occlusion"]
+Size = Literal["compact", "published"]
+NETWORKS, SIZES = get_args(Network), get_args(Size)
+
+NAMED = ("full_body", "body_53", "body_hands")
+"""Layouts that can be named: those of ``solver.neural.layout``."""
 
 
 @dataclass(frozen=True)
@@ -21,10 +26,14 @@ class TrainRequest:
     out : file for the weights
     session : session whose layout and body the network is trained for
     layout : name of a layout instead, for anybody
+    network : which one: that of the method ``neural``, for any layout; the published solver of one layout, a graph of
+        markers and joints; or the published network that fills gaps
+    size : of the published ones
     motions : folders of BVH and AMC files to learn from, beside made motions
     made : so many made motions of 8 s
     minutes, steps : that it may take; with steps alone to end it, the same request gives the same weights
-    start : weights to begin with instead of those that ship
+    start : weights to begin with, of the same network, and but for ``agnostic`` of the same layout; None: those that
+        ship, where there are any
     resume : whether a training that was stopped goes on
     seed : of every random choice
     """
@@ -32,6 +41,8 @@ class TrainRequest:
     out: Path
     session: Path | None = None
     layout: str | None = None
+    network: Network = "agnostic"
+    size: Size = "compact"
     motions: tuple[Path, ...] = ()
     made: int = 120
     minutes: float = 15.0
@@ -46,6 +57,14 @@ class TrainRequest:
             raise InputError("either a session or a layout is trained for", None, "name a session, or --layout NAME")
         if self.layout is not None and self.layout not in NAMED:
             raise InputError(f'there is no layout "{self.layout}"', "--layout", f"use {' or '.join(NAMED)}")
+        if self.network not in NETWORKS:
+            raise InputError(f'there is no network "{self.network}"', "--network", f"use {' or '.join(NETWORKS)}")
+        if self.network == "agnostic" and self.layout == "body_hands":
+            raise InputError("the network agnostic solves no fingers", "--layout", "use body_53, or another network")
+        if self.network == "agnostic" and self.size != "compact":
+            raise InputError("the network agnostic has one size", "--size", "leave it out, or use another network")
+        if self.start is not None and self.size != "compact":
+            raise InputError("the weights to begin with say the size", "--size", "leave it, or --start, out")
         if not (math.isfinite(self.minutes) and self.minutes > 0):
             raise InputError(f"{self.minutes:g} is not possible", "--minutes", "give a number above 0")
         if self.steps is not None and self.steps < 1:

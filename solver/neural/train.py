@@ -119,6 +119,7 @@ def train(
     what: str = "",
     progress: Progress = silent,
     enough: Callable[[], bool] = never,
+    keep: bool = False,
 ) -> Trained:
     """Train from ``params`` on, which are not changed.
 
@@ -126,6 +127,7 @@ def train(
     ----------
     loss, judge : see there; ``judge`` is called without gradients
     checkpoint : file that is written from time to time, taken up where it is there, and removed at the end
+    keep : leave it there at the end: a training that is one of several is not done again when these are taken up
     what : digest of what is trained on what; a checkpoint of anything else is refused
     enough : asked before every step; True ends the training, the best so far is kept
 
@@ -179,9 +181,9 @@ def train(
             raise
         if state.step % settings.check or not state.history:
             _look(state, judge)
-        if stopped and checkpoint is not None:
+        if (stopped or keep) and checkpoint is not None:
             _save(checkpoint, what, state, optimiser)
-    if checkpoint is not None and not stopped:
+    if checkpoint is not None and not (stopped or keep):
         checkpoint.unlink(missing_ok=True)
     progress(1.0, f"{state.step} steps, held out {state.figures['score']:.4g}")
     return Trained(state.best, state.figures, state.step, state.seconds, tuple(state.history), stopped)

@@ -53,6 +53,19 @@ class Card:
     version: str = __version__
 
 
+def require_torch() -> None:
+    """Say what is missing.
+
+    Raises
+    ------
+    InputError : torch is not there
+    """
+    try:
+        import torch  # noqa: F401
+    except ImportError as error:
+        raise InputError("networks need torch, which is not installed", None, "pip install torch") from error
+
+
 def save_weights(path: str | Path, params: Mapping[str, Tensor], card: Card) -> Card:
     """Write weights and their card, dated now; the card as written."""
     from safetensors.torch import save
@@ -102,7 +115,7 @@ def load_weights(
 
     Raises
     ------
-    InputError : the file holds no weights of ours, or those of another network or layout
+    InputError : the file holds no weights of ours, or those of another network or layout; or torch is not there
     """
     card = read_card(path)
     if network is not None and card.network != network:
@@ -111,6 +124,7 @@ def load_weights(
     if layout is not None and card.layout and card.layout != layout:
         what = f"was trained for another layout of {len(card.labels)} markers ({card.layout}, this one is {layout})"
         raise InputError(what, path, "train a network on this layout")
+    require_torch()
     from safetensors import SafetensorError
     from safetensors.torch import load
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -65,29 +64,23 @@ def fit_from_poses(given: Mapping[str, Any], settings: NeuralFitSettings, progre
 
 def _poses(given: Mapping[str, Any], settings: NetworkSettings, row: int, progress: Progress) -> NetworkPoses:
     """The network's poses with the markers where a candidate has them, beside the default fit of that candidate."""
-    from solver.neural import agnostic_solve
     from solver.neural.agnostic_fit import marked
-    from solver.neural.agnostic_trust import blended, expected_errors
-    from solver.neural.places import check_places
+    from solver.neural.agnostic_trust import blended
+    from solver.neural.posing import pose_network
     from solver.solve.kinematics import Points, Pose, forward, place_points
     from solver.solve.method import fit
     from solver.solve.settings import FitSettings
 
-    path: Path | None = given["weights_file"]
     body, seen, landmarks = scene_of(given)
-    found, ranked, time = given["localize"], given["orient"], given["clean"].markers.time
+    found, ranked, cleaned = given["localize"], given["orient"], given["clean"].markers
     chosen = ranked.candidates[row]
-    ready = agnostic_solve.load(path)
-    check_places(ready.card, body, chosen.vertex, path)
-    there = marked(body, chosen)
+    network = pose_network(given["weights_file"], body, marked(body, chosen), chosen.vertex)
     if settings.tune_steps:
-        from solver.neural.finetune import Ground, tuned
-
-        ready = tuned(ready, Ground(body, person=there), settings.tune_steps, part_of(progress, 0.0, 0.8))
-    usual = fit(body, seen, landmarks, found, ranked, time, FitSettings(row), part_of(progress, 0.8, 0.9))
+        network = network.tuned(settings.tune_steps, part_of(progress, 0.0, 0.8))
+    usual = fit(body, seen, landmarks, found, ranked, cleaned.time, FitSettings(row), part_of(progress, 0.8, 0.9))
     markers = seen.markers[:, found.markers]
-    solved = agnostic_solve.solve_frames(ready, markers, there, part_of(progress, 0.9, 1.0))
-    blend = blended(solved.rotations, usual.rotations, expected_errors(ready, body, there), settings.default_deg)
+    solved = network.poses(markers, cleaned.rate, part_of(progress, 0.9, 1.0))
+    blend = blended(solved.rotations, usual.rotations, network.expected_errors(), settings.default_deg)
     own = Pose(solved.rotations, solved.trans, chosen.betas)
     placed = place_points(Points(chosen.rest, chosen.dirs, chosen.weights), forward(body, own), own.betas)
     return NetworkPoses(
@@ -98,7 +91,7 @@ def _poses(given: Mapping[str, Any], settings: NetworkSettings, row: int, progre
         spread_deg=blend.spread_deg,
         seen=solved.seen,
         gap=float(np.nanmedian(np.linalg.norm(placed - markers, axis=2))),
-        weights=f"{'shipped' if path is None else path.name}, {ready.card.steps} steps, {ready.card.date[:10]}",
+        weights=network.about,
         tuned=settings.tune_steps,
         default_deg=settings.default_deg,
     )
