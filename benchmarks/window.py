@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+_MOST_BEATS = 5_000_000
 STEPS, WARM_UP, MEMORY_STEPS, DRAGS = 150, 200, 2000, 60
 Spin = Callable[..., None]
 
@@ -240,18 +241,26 @@ def stalls(window: Any, spin: Spin) -> None:
     document.apply(edits.set_seed(document.session, seed))
     window.raise_dock("candidates")
     spin()
-    beats: list[tuple[float, float]] = []
+    # Written into an array: objects that pile up would be work for Python's collector, which is watched here as well.
+    beats, count = np.zeros((_MOST_BEATS, 2)), 0
+
+    def beat() -> None:
+        nonlocal count
+        beats[count % _MOST_BEATS] = time.perf_counter(), time.thread_time()
+        count += 1
+
     timer = QTimer(interval=0)
-    timer.timeout.connect(lambda: beats.append((time.perf_counter(), time.thread_time())))
+    timer.timeout.connect(beat)
     timer.start()
     window.table.trigger("run.all")
     live(lambda: not window.bench.runner.running)
     rest = time.monotonic() + 1.0
     live(lambda: time.monotonic() > rest)
     timer.stop()
-    gaps, own = 1000 * np.diff(beats, axis=0).T
+    assert count <= _MOST_BEATS, "the run took too long to be watched"
+    gaps, own = 1000 * np.diff(beats[:count], axis=0).T
     late = f"{gaps.max():.0f} ms; {int((gaps > 50).sum())} over 50 ms"
-    seconds = beats[-1][0] - beats[0][0]
+    seconds = beats[count - 1, 0] - beats[0, 0]
     say(f"longest stall of the event loop while a fit runs, {seconds:.0f} s", late, "50 ms", f"{own.max():.0f} ms")
 
 

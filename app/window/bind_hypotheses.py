@@ -49,8 +49,10 @@ class HypothesesBinder:
             self._of, self._images = ranked, {}
             self._timer.start()
         fit = self.bench.board.settings.get("fit") if self.bench.document.is_open else None
+        before = self._picture
         self._picture = hypotheses_picture(ranked, getattr(fit, "candidate", None) or 0, self.shown.get("solve"))
-        self._show()
+        if repr(self._picture) != repr(before):  # which takes NaN for NaN
+            self._show()
 
     def _show(self) -> None:
         assert self._picture is not None

@@ -32,6 +32,10 @@ class ProgressStrip(QWidget):
         self.stop_button.setToolTip("End the run; what was computed before stays")
         self.stop_button.setAccessibleName("Stop the run")
         self.stop_button.clicked.connect(self.stop)
+        for part in (self.bar, self.stop_button):  # else the whole window would be laid out anew at each run's end
+            policy = part.sizePolicy()
+            policy.setRetainSizeWhenHidden(True)
+            part.setSizePolicy(policy)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(6, 0, 6, 0)
         layout.addWidget(self.label, 1)

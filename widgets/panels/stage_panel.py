@@ -36,6 +36,7 @@ class StagePanel(QScrollArea):
         self.setWidget(self._inner)
         self._cards: dict[str, StageCard] = {}
         self._to_open: frozenset[str] | None = None
+        self._least_width = 0
 
     def set_stages(self, stages: Sequence[StageData]) -> None:
         """Show these, in order; cards of stages that stay are kept, with what is open in them."""
@@ -82,7 +83,10 @@ class StagePanel(QScrollArea):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Ask for the width that the cards need now: nothing of them may be out of sight."""
         if watched is self._inner and event.type() == QEvent.Type.LayoutRequest:
-            self.updateGeometry()
+            width = self.minimumSizeHint().width()
+            if width != self._least_width:  # asking lays the whole window out anew
+                self._least_width = width
+                self.updateGeometry()
         return super().eventFilter(watched, event)
 
     def sizeHint(self) -> QSize:
