@@ -105,7 +105,7 @@ GRAPH = (
     ),
     Stage(
         "orient",
-        5,
+        6,
         OrientSettings,
         (*FITTED_TO, "localize", "camera_file"),
         fitting.rank_placements,
