@@ -14,7 +14,7 @@ _STILL_DEG = 12.0
 _JUDGED = 3
 _TIE = 1.15
 _STEEPNESS = 8.5
-"""Told from 400 synthetic sessions (``markerscope bench parts`` and ``accuracy``): the likeliest for which were right."""
+"""Told from 400 synthetic sessions of ``markerscope bench``: with it, which were right was likeliest."""
 
 
 def judge(candidates: tuple[Candidate, ...]) -> Orientation:
