@@ -2,8 +2,8 @@
 
     python -m benchmarks.readme OUT [--marks NAME] [--readme FILE]
 
-OUT is the folder of ``markerscope bench SUITE --out OUT``; the marks are ``<!-- bench:NAME begin -->`` and ``end``,
-where NAME is the suite's unless another is given.
+OUT is the folder of ``markerscope bench SUITE --out OUT``, or a file that holds what another benchmark printed. The
+marks are ``<!-- bench:NAME begin -->`` and ``end``, where NAME is the suite's unless another is given.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def put(out: Path, readme: Path, marks: str | None = None) -> str:
     """Replace what is between the named marks, or those of OUT's suite; returns their name."""
     try:
         suite = marks or json.loads((out / "bench.json").read_text(encoding="utf-8"))["suite"]
-        table = (out / "bench.md").read_text(encoding="utf-8").strip()
+        table = (out if out.is_file() else out / "bench.md").read_text(encoding="utf-8").strip()
     except (OSError, ValueError, KeyError) as error:
         raise InputError("holds no benchmark", out, "run markerscope bench SUITE --out there first") from error
     begin, end = (f"<!-- bench:{suite} {which} -->" for which in ("begin", "end"))

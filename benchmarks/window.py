@@ -13,17 +13,18 @@ from __future__ import annotations
 import argparse
 import gc
 import os
-import platform
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from benchmarks.table import head, say, say_spread, timed, where
 
 _MOST_BEATS = 5_000_000
 STEPS, WARM_UP, MEMORY_STEPS, DRAGS = 150, 200, 2000, 60
@@ -39,7 +40,7 @@ def main() -> None:
     if options.start is not None:
         show_and_leave(options.start)
         return
-    print("| | measured | budget | processor |\n|---|---:|---:|---:|")
+    head()
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         starts()
@@ -52,38 +53,7 @@ def main() -> None:
             steps(window, spin)
             memory(window, spin)
             stalls(window, spin)
-        print(f"\n{machine(window)}")
-
-
-def say(what: str, measured: str, budget: str = "", processor: str = "") -> None:
-    """A row of the table, as soon as it is known."""
-    print(f"| {what} | {measured} | {budget} | {processor} |", flush=True)
-
-
-def say_spread(what: str, took: Sequence[tuple[float, float]], budget: str) -> None:
-    """A row on something done many times: the median, the 95th percentile and the longest, ms."""
-    passed, own = np.array(took).T
-    spread = "; ".join(f"{value:.0f}" for value in (np.median(passed), np.percentile(passed, 95), passed.max()))
-    say(f"{what}: median; p95; max", f"{spread} ms", budget, f"{np.percentile(own, 95):.0f} ms")
-
-
-def timed(act: Callable[[], object]) -> tuple[float, float]:
-    """Milliseconds that something takes, and those of them in which the window's thread was at work."""
-    began, busy = time.perf_counter(), time.thread_time()
-    act()
-    return 1000 * (time.perf_counter() - began), 1000 * (time.thread_time() - busy)
-
-
-def machine(window: Any) -> str:
-    """What it was measured on, in a line."""
-    name = platform.processor() or platform.machine()
-    cpus = Path("/proc/cpuinfo")
-    if cpus.exists():
-        lines = [line for line in cpus.read_text().splitlines() if line.startswith("model name")]
-        name = lines[0].split(":", 1)[1].strip() if lines else name
-    graphics = "no graphics card" if window.scene.software else "a graphics card"
-    load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
-    return f"{name}, {os.cpu_count()} cores, {graphics}; {platform.system()}, Python {platform.python_version()}{load}."
+        print(f"\n{where(window)}")
 
 
 def show_and_leave(since: float) -> None:
