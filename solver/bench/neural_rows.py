@@ -31,7 +31,7 @@ def _graph(about: str, layout_name: str, **chosen: Any) -> Any:
             ground.body,
             layout,
             both,
-            Choice(**chosen),
+            Choice(batch=_BATCH, **({"sizes": _sizes()} | chosen)),
             _training(minutes, ground.seed),
             checkpoint=ground.folder / f"{key}.checkpoint",
             progress=progress,
@@ -149,10 +149,14 @@ def _fills(about: str, filled_first: bool) -> Any:
     return run
 
 
-def _sizes(**changed: Any) -> Any:
-    from solver.neural.heterogeneous import Sizes
+_BATCH = 96
 
-    return Sizes(**changed)
+
+def _sizes(**changed: Any) -> Any:
+    """Those for a training of a few minutes."""
+    from solver.neural.heterogeneous import COMPACT
+
+    return replace(COMPACT, **changed)
 
 
 ENTRIES = (
