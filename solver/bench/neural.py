@@ -213,8 +213,8 @@ def _said(header: dict[str, Any]) -> str:
     return (
         f"`{header['command']}`\n\n"
         f"{header['date']}, Markerscope {header['version']}, {on['processor']}, {on['cores']} cores, {on['system']}, "
-        f"Python {on['python']}; training on one thread, dense layers of 384 and 96 examples a step. Where other work ran beside it a minute held "
-        "few steps: compare by steps.\n\n"
+        f"Python {on['python']}; training on one thread, dense layers of 384, 96 examples a step. Where other work ran "
+        "beside it a minute held few steps: compare by steps.\n\n"
         f"Synthetic: {header['bodies']} bodies outside of the shape basis that no network has seen, a second of each, "
         f"nothing lost. Kinds of action seen: other parts of {', '.join(header['seen'])}; unseen: "
         f"{', '.join(header['unseen'])}. The agnostic network is told where the markers and the joints are on the "
