@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,6 @@ WINDOW, OVERLAP = 64, 32
 HIDDEN: Mapping[str, int] = {"body": 800, "left_hand": 400, "right_hand": 400}
 """Units of the recurrent layer, each way, as published."""
 COMPACT_HIDDEN = 128
-_CORRECTION_M = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +35,9 @@ class Occlusion:
     features : of marker nodes after each convolution; the input is 4
     hidden : units of the recurrent layer each way
     filled_first : without, lost markers come in at their mean place, not where distances put them (an ablation)
+    beside : whether each marker's features after the convolutions speak for it beside the recurrent layer; without, as
+        published, all markers are squeezed through that layer, which takes many units and a long training
+    correction_m : m, what one at the output means: about as far as what is filled is off
     """
 
     links: tuple[tuple[int, ...], ...]
@@ -44,22 +46,22 @@ class Occlusion:
     features: tuple[int, ...] = (6, 10, 16)
     hidden: int = 800
     filled_first: bool = True
+    beside: bool = False
+    correction_m: float = 0.03
 
     kind = "occlusion"
 
     def config(self) -> dict[str, Any]:
         """All that ``from_config`` needs, as JSON has it."""
-        names = ("links", "mean_markers", "spread", "features", "hidden", "filled_first")
-        return {name: getattr(self, name) for name in names}
+        return {own.name: getattr(self, own.name) for own in fields(self)}
 
     @classmethod
     def from_config(cls, said: Mapping[str, Any]) -> Occlusion:
         """The network of a card."""
         links = tuple(tuple(int(i) for i in row) for row in said["links"])
         features = tuple(int(f) for f in said["features"])
-        return cls(
-            links, said["mean_markers"], said["spread"], features, int(said["hidden"]), bool(said["filled_first"])
-        )
+        rest = {name: said[name] for name in ("filled_first", "beside", "correction_m") if name in said}
+        return cls(links, said["mean_markers"], said["spread"], features, int(said["hidden"]), **rest)
 
     @cached_property
     def _layers(self) -> list[EdgeConvolution]:
@@ -91,6 +93,8 @@ class Occlusion:
             ):
                 params[f"lstm.{way}.{name}"] = bound * (2 * torch.rand(shape, generator=random) - 1)
         new_dense(params, "out", 2 * self.hidden, 3 * markers, random, 0.0)
+        if self.beside:
+            params["beside.w"] = torch.zeros(markers, self.features[-1], 3)
         return params
 
     def __call__(self, params: Params, markers: Tensor, visible: Tensor) -> Tensor:
@@ -108,18 +112,24 @@ class Occlusion:
         import torch
 
         count, window = markers.shape[:2]
+
+        def per_window(features: Tensor) -> Tensor:
+            """(M, N W, C) to (N, W, M, C)."""
+            return features.transpose(0, 1).unflatten(0, (count, window))
+
         seen = visible[..., None].to(markers.dtype)
         given = markers if self.filled_first else seen * markers + (1 - seen) * self._mean
         x = torch.cat([given - self._mean, seen], -1).flatten(0, 1).transpose(0, 1)  # (M, N W, 4)
         x = leaky(relative(self._layers[0], params, "marker0", x, self.spread) + params["marker0.b"])
         for k, layer in enumerate(self._layers[1:], start=1):
             x = leaky(layer(params, f"marker{k}", x) + params[f"marker{k}.b"])
-        x = x.transpose(0, 1).flatten(1).unflatten(0, (count, window))
+        own = per_window(x @ params["beside.w"]) if self.beside else 0.0
+        x = per_window(x).flatten(2)
         zero = x.new_zeros(2, count, self.hidden)
         weights = [params[f"lstm.{way}.{name}"] for way in ("forth", "back") for name in ("ih", "hh", "bih", "bhh")]
         x, _, _ = torch.lstm(x, (zero, zero), weights, True, 1, 0.0, False, True, True)
-        off = _CORRECTION_M * dense(params, "out", x).unflatten(2, (len(self.links), 3))
-        return given + (1 - seen) * off
+        off = dense(params, "out", x).unflatten(2, (len(self.links), 3)) + own
+        return given + (1 - seen) * self.correction_m * off
 
 
 def windows(frames: int) -> np.ndarray:

@@ -229,3 +229,30 @@ def test_it_is_kept_in_a_file_and_is_a_way_of_filling_like_any_other(
     assert np.allclose(one.positions, other.positions, atol=1e-6) and one.filled.sum() == 10
     with pytest.raises(InputError, match="another layout"):
         load_fill_network(file, layout.select(np.arange(5)))
+
+
+def test_markers_speak_for_themselves_beside_the_recurrent_layer(
+    network: Occlusion, sampler: Sampler, layout: Layout, body: Body
+) -> None:
+    """With the recurrent layer silent, a marker's correction is told by what it hears from its neighbours alone."""
+    beside = replace(network, beside=True, correction_m=0.01)
+    again = Occlusion.from_config(json.loads(json.dumps(beside.config())))
+    assert again.beside and again.correction_m == 0.01 and "beside.w" not in network.initial(0)
+    params = beside.initial(0)
+    markers, visible = 0.2 * torch.randn(2, 20, 24, 3), torch.ones(2, 20, 24)
+    visible[:, 5, 3] = 0
+    assert torch.equal(beside(params, markers, visible), markers), "it corrects nothing at first"
+    params["beside.w"] = torch.randn(params["beside.w"].shape, generator=generator(0))
+    said = beside(params, markers, visible)
+    assert (said - markers)[:, 5, 3].abs().max() > 0
+    reached, frontier = {3}, {3}
+    for _ in network.features:  # as far as its neighbours' neighbours' neighbours
+        frontier = {k for m in frontier for k in network.links[m]}
+        reached |= frontier
+    for marker in range(24):
+        moved = markers.clone()
+        moved[:, 5, marker] += 0.1
+        changed = not torch.equal((beside(params, moved, visible) - moved)[:, 5, 3], (said - markers)[:, 5, 3])
+        assert changed <= (marker in reached), marker
+    old = {name: value for name, value in network.config().items() if name not in ("beside", "correction_m")}
+    assert Occlusion.from_config(old).correction_m == 0.03 and not Occlusion.from_config(old).beside
