@@ -41,12 +41,7 @@ def check_places(card: Card, body: Body, vertex: np.ndarray, path: Path | None) 
     check_body(trained["body"], body, path)
     known = len(same_places(body, vertex, np.array(trained["vertex"], int))[0])
     if known < _SHARE * len(vertex):
-        raise InputError(
-            f"was trained for another layout: only {known} of these {len(vertex)} markers sit where its "
-            f"{len(trained['vertex'])} do",
-            path,
-            "train on this session, or leave --weights out",
-        )
+        raise _another(f"only {known} of these {len(vertex)} markers sit where its {len(trained['vertex'])} do", path)
 
 
 def columns_of(body: Body, vertex: np.ndarray, layout: Layout, path: Path | None) -> np.ndarray:
@@ -64,15 +59,15 @@ def columns_of(body: Body, vertex: np.ndarray, layout: Layout, path: Path | None
     check_body(layout.body, body, path)
     own, trained = same_places(body, vertex, layout.vertex)
     if len(own) < _SHARE * len(layout):
-        raise InputError(
-            f"was trained for another layout: only {len(own)} of its {len(layout)} markers sit where these "
-            f"{len(vertex)} do",
-            path,
-            "train on this session, or leave --weights out",
-        )
+        raise _another(f"only {len(own)} of its {len(layout)} markers sit where these {len(vertex)} do", path)
     columns = np.full(len(layout), -1, dtype=np.intp)
     columns[trained] = own
     return columns
+
+
+def _another(why: str, path: Path | None) -> InputError:
+    what = f"was trained for another layout: {why}"
+    return InputError(what, path, "train on this session, or leave --weights out")
 
 
 def check_body(trained: str, body: Body, path: Path | None) -> None:

@@ -96,7 +96,7 @@ def train_graph(request: TrainRequest, progress: Progress) -> Learnt:
     """The published solver of one layout: the body's network, and a hand's where its fingers carry markers."""
     from solver.neural.build import Choice
     from solver.neural.heterogeneous import COMPACT
-    from solver.neural.named import load_solver, save_solver, train_solver
+    from solver.neural.named import groups_of, load_solver, save_solver, train_solver
 
     require_torch()
     site = site_of(request, part_of(progress, 0.0, 0.05))
@@ -124,7 +124,8 @@ def train_graph(request: TrainRequest, progress: Progress) -> Learnt:
         lines.append(f"{_HELD_OUT} {who} turned wrongly by {off}.")
     steps, seconds = found["body"].steps, sum(one.seconds for one in found.values())
     card = save_solver(request.out, solver, _card(request, before, figures, steps, seconds))
-    return Learnt(card, tuple(lines), any(one.stopped for one in found.values()))
+    stopped = len(found) < len(groups_of(site.layout)) or any(one.stopped for one in found.values())
+    return Learnt(card, tuple(lines), stopped)
 
 
 def train_occlusion(request: TrainRequest, progress: Progress) -> Learnt:
