@@ -12,7 +12,7 @@ from solver.clean.fill import METHODS, fill
 from solver.clean.gap_model import GapModel, draw_gaps, heavy_tailed
 from solver.clean.gaps import Fill, Filled, FillSettings, gaps_to_fill, together
 from solver.clean.request import Method
-from solver.neural.align import align, into, out_of
+from solver.neural.align import align, into, out_of, over_rest
 from solver.neural.examples import Sampler, generator
 from solver.neural.layers import Params, spread_of
 from solver.neural.layout import Layout
@@ -28,6 +28,8 @@ _EVERYTHING = FillSettings(max_gap=None, min_confidence=0.0)
 _SHARES = (0.05, 0.1, 0.2)
 _BETTER = 0.98
 """Share of the default's error that the network has to stay below: less is chance."""
+_NEAR_M = 0.05
+"""Markers further from one that was never seen count ever less in where it is put."""
 _FEWEST_HIDDEN = 50
 """Hidden samples on which a comparison means something."""
 
@@ -79,7 +81,7 @@ class Worth:
 
 
 def completed(positions: np.ndarray, rate: float, start: Method, layout: Layout, rest: np.ndarray) -> np.ndarray:
-    """(T, M, 3) m without gaps: by the method, by a rigid body where it cannot, and at last where the mean body has it.
+    """(T, M, 3) m without gaps: by the method, by a rigid body where it cannot, and at last as at rest.
 
     Parameters
     ----------
@@ -93,13 +95,13 @@ def completed(positions: np.ndarray, rate: float, start: Method, layout: Layout,
             return whole
         whole = METHODS[method](whole, rate, replace(_EVERYTHING, method=method)).positions
     lost = ~np.isfinite(whole).all(axis=2)
-    if lost.any():
-        rest_there = torch.as_tensor(rest, dtype=torch.float64)
-        _, R, t = align(torch.as_tensor(whole), layout, rest_there)
-        # The frame of the waist is not the rest body's: where it lies there is the same question at rest.
-        _, R_rest, t_rest = align(rest_there[None], layout, rest_there)
-        placed = out_of(into(rest_there[None], R_rest, t_rest).expand(len(R), -1, -1), R, t).numpy()
-        whole = np.where(lost[..., None], placed, whole)
+    given, there, at_rest = (torch.tensor(array) for array in (whole, ~lost, rest))
+    whole = whole.copy()
+    for m in np.flatnonzero(lost.any(axis=0)):
+        # Never seen: as the body at rest has it among the markers that are near, for these ride with it.
+        near = ((at_rest - at_rest[m]).square().sum(-1) + _NEAR_M**2) ** -3
+        R, t = over_rest(given, there, at_rest, near / near.max())
+        whole[:, m] = np.where(lost[:, m, None], (R @ at_rest[m] + t).numpy(), whole[:, m])
     return np.nan_to_num(whole)
 
 
