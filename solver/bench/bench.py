@@ -12,6 +12,7 @@ from typing import Any
 from solver import __version__
 from solver.bench.cases import FRAMES, Case, cases_of
 from solver.bench.cold import cold_seconds
+from solver.bench.descents import descents_of
 from solver.bench.execute import Run, with_key
 from solver.bench.keys import key_of
 from solver.bench.machine import machine
@@ -57,7 +58,7 @@ def run_bench(request: BenchRequest, progress: Progress = silent) -> Outcome:
         "calibration": [dataclasses.asdict(entry) for entry in bins],
         "runs": [record["key"] for record in records],
     }
-    text = f"{_said(header, cases, methods)}\n{table}{_failures(records)}"
+    text = f"{_said(header, cases, methods)}\n{table}{descents_of(records)}{_failures(records)}"
     write_text_atomic(request.out / "bench.md", text)
     write_text_atomic(request.out / "bench.json", json.dumps(plain(summary), indent=1) + "\n")
     progress(1.0, "done")

@@ -157,16 +157,16 @@ def markdown_of(rows: Sequence[Row], bins: Sequence[Bin]) -> str:
         name for name in FIGURES if any(name in row.figures for row in rows) and (parts or name != "part_mpjpe_mm")
     ]
     header = ["case", "method", "runs", *SHARES.values(), *(FIGURES[name] for name in names)]
-    lines = [_line(header), _line(["---"] * len(header))]
+    lines = [line(header), line(["---"] * len(header))]
     for row in rows:
         shares = [f"{100 * hit / of:.0f} % of {of}" if of else "–" for hit, of in row.shares.values()]
-        lines.append(_line([row.case, row.method, _runs(row), *shares, *(_cell(row, name) for name in names)]))
+        lines.append(line([row.case, row.method, _runs(row), *shares, *(_cell(row, name) for name in names)]))
     if bins:
         lines += ["", "How often a method was right, by how sure it said it was:", ""]
         header = ["method", "confidence", "runs", "right", "true answer among those named"]
-        lines += [_line(header), _line(["---"] * len(header))]
+        lines += [line(header), line(["---"] * len(header))]
         lines += [
-            _line([b.method, b.confidence, str(b.count), _share(b.right, b.count), _share(b.named, b.count)])
+            line([b.method, b.confidence, str(b.count), _share(b.right, b.count), _share(b.named, b.count)])
             for b in bins
         ]
     return "\n".join(lines) + "\n"
@@ -201,5 +201,6 @@ def _percent(value: float) -> str:
     return f"{100 * value:.0f}"
 
 
-def _line(cells: Sequence[str]) -> str:
+def line(cells: Sequence[str]) -> str:
+    """A row in Markdown."""
     return f"| {' | '.join(cells)} |"

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from solver.bench.descents import descents_of
 from solver.bench.table import bins_of, markdown_of, rows_of
 from tests.bench.jobs import figures
 
@@ -71,3 +72,15 @@ def test_confidence_is_held_against_being_right() -> None:
         ("0.9 to 0.99", 2, 1, 2),
         ("0.99 and more", 2, 1, 1),
     ]
+
+
+def test_iterations_are_told_where_a_method_says_them() -> None:
+    def record(method: str, count: int | None, converged: bool = True) -> dict[str, Any]:
+        info = {} if count is None else {"iterations": {"stage 2": count}, "converged": {"stage 2": converged}}
+        return {"method": method, "info": info}
+
+    told = descents_of(
+        [record("paper", 400, False), record("paper", 100), record("paper", 380), record("bundle", None)]
+    )
+    assert "| paper | stage 2 | 3 | 380 (400) | 1 |" in told and "bundle" not in told
+    assert descents_of([record("bundle", None)]) == ""
