@@ -121,10 +121,14 @@ def test_weights_for_another_layout_are_refused_in_one_sentence(files: Path, out
     other = replace(ready.card, config=dict(ready.card.config) | {"places": places_of(body, feet)}, date="")
     path = tmp_path / "feet.safetensors"
     save_weights(path, ready.params, other)
-    before = sorted(out.rglob("*.json"))
+
+    def results() -> list[Path]:  # but for what is noted of files, to know them again
+        return sorted(path for path in out.rglob("*.json") if path.name != "digests.json")
+
+    before = results()
     with pytest.raises(InputError, match=r"was trained for another layout: only \d+ of these \d+ markers sit"):
         solve_session(request(files, out, path), silent)
-    assert sorted(out.rglob("*.json")) == before
+    assert results() == before
     card = replace(other, config=dict(other.config) | {"places": {"body": "another", "vertex": [1]}})
     with pytest.raises(InputError, match="another body model"):
         check_places(card, body, feet, path)
