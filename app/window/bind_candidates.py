@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from PySide6.QtCore import QTimer
+
 from app.models import edits
 from app.models.fits import CANDIDATE_COLOURS
 from app.models.workbench import Workbench
@@ -24,6 +26,8 @@ class CandidatesBinder:
         self._table: Table | None = None
         self._step = ""
         self._choosing = False
+        self._filling = QTimer(widget, singleShot=True, interval=0)  # after the scene: a picture waits for no table
+        self._filling.timeout.connect(self.fill)
         shown.changed.connect(self._changed)
         bench.document.changed.connect(lambda another: self.fill())
         bench.runner.found.connect(self._found)
@@ -89,7 +93,7 @@ class CandidatesBinder:
 
     def _changed(self, stages: frozenset[str]) -> None:
         if stages & {"localize", "orient", "fit", "markers", "clean"}:
-            self.fill()
+            self._filling.start()
 
     def _found(self, found: Found) -> None:
         if found.kind in ("candidate", "chain"):

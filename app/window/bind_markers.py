@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from PySide6.QtCore import QTimer
+
 from app.models.workbench import Workbench
 from app.views.colours import by_cluster
 from app.views.markers import marker_table
@@ -15,14 +17,20 @@ class MarkersBinder:
     def __init__(self, widget: MarkerTable, bench: Workbench, shown: Shown) -> None:
         self.widget, self.bench, self.shown = widget, bench, shown
         self._telling = False
+        self._filling = QTimer(widget, singleShot=True, interval=0)  # after the scene: a picture waits for no table
+        self._filling.timeout.connect(self._fill)
         shown.changed.connect(self._changed)
         bench.selection.changed.connect(lambda what: self._select())
         widget.markers_selected.connect(self._selected)
         widget.worst_requested.connect(self._worst)
 
     def _changed(self, stages: frozenset[str]) -> None:
+        if stages & {"markers", "clean", "segment", "fit"}:
+            self._filling.start()
+
+    def _fill(self) -> None:
         tracks = self.shown.tracks
-        if tracks is None or not stages & {"markers", "clean", "segment", "fit"}:
+        if tracks is None:
             return
         segmentation, motion = self.shown.segmentation, self.shown.fit
         rows = self.shown.once(
