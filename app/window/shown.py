@@ -51,6 +51,7 @@ class Shown:
         if another:
             gone = frozenset(self._refs)
             self._refs, self._values, self._compared, self._made = {}, {}, {}, {}
+            self._posed = None
             self.changed.emit(gone)
             if self.bench.document.is_open:
                 self._load_body_ahead()

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
-from scipy.linalg.blas import strsm
-from scipy.linalg.lapack import strtrs
+from scipy.linalg import get_blas_funcs, get_lapack_funcs
 
 from solver.body.skeleton import INDEX, descendants
 from solver.solve.kinematics import Chain, Points, pose_jacobian
@@ -114,19 +114,29 @@ class NormalEquations:
         # With L L^T = h_ff, everything that the frames say of the shared unknowns is one product of L^-1 [h_fs, g_f].
         # Single precision does for a step that is only taken where it pays, in half the time.
         frames, size = self.g_f.shape
-        lower = np.linalg.cholesky(self.h_ff.astype(np.float32))
-        rows = np.empty((frames, size, len(free) + 1), np.float32)
+        try:
+            lower: np.ndarray = np.linalg.cholesky(self.h_ff.astype(np.float32))
+        except np.linalg.LinAlgError:  # nearly nothing holds some joint, less than single precision can tell
+            lower = np.linalg.cholesky(self.h_ff)
+        trsm, trtrs = _routines(lower)
+        rows = np.empty((frames, size, len(free) + 1), lower.dtype)
         rows[..., :-1] = self.h_fs[..., free]
         rows[..., -1] = self.g_f
         for of_frame, factor in zip(rows, lower, strict=True):
             # LAPACK counts by columns, so it sees both transposed; it then works in place, without a copy.
-            strsm(1.0, factor.T, of_frame.T, side=1, lower=0, overwrite_b=1)
+            trsm(1.0, factor.T, of_frame.T, side=1, lower=0, overwrite_b=1)
         flat = rows.reshape(frames * size, -1)
         product = flat.T @ flat
         shared[free] = -np.linalg.solve(h_ss - product[:-1, :-1], self.g_s[free] - product[:-1, -1])
-        known = rows[..., -1] + rows[..., :-1] @ shared[free].astype(np.float32)
-        step = [strtrs(factor.T, one, lower=0, trans=0)[0] for factor, one in zip(lower, known, strict=True)]
+        known = rows[..., -1] + rows[..., :-1] @ shared[free].astype(lower.dtype)
+        step = [trtrs(factor.T, one, lower=0, trans=0)[0] for factor, one in zip(lower, known, strict=True)]
         return -np.stack(step), shared
+
+
+def _routines(lower: np.ndarray) -> tuple[Any, Any]:
+    """BLAS's trsm and LAPACK's trtrs for the precision of an array."""
+    (trsm,), (trtrs,) = list(get_blas_funcs(("trsm",), (lower,))), list(get_lapack_funcs(("trtrs",), (lower,)))  # type: ignore
+    return trsm, trtrs
 
 
 def diagonal_blocks(matrices: np.ndarray) -> np.ndarray:
