@@ -3,6 +3,7 @@ ifndef PYTHON
 PYTHON := $(firstword $(foreach name,python3.11 python3.12 python3,$(if $(shell $(name) -c "" 2>/dev/null && echo yes),$(name))))
 endif
 ENV = $(PYTHON) tools/setup_env.py
+DEV = $(ENV) --dev
 # Two test processes of one thread each: small operations on spinning threads are slower than on one.
 export OMP_NUM_THREADS ?= 1
 export OMP_WAIT_POLICY ?= passive
@@ -15,23 +16,23 @@ demo: need-python
 
 # Everything that must hold.
 test: lint
-	$(ENV) python -m pytest -q -n 2
+	$(DEV) python -m pytest -q -n 2
 
 lint: need-python
-	$(ENV) ruff check .
-	$(ENV) ruff format --check .
-	$(ENV) mypy
+	$(DEV) ruff check .
+	$(DEV) ruff format --check .
+	$(DEV) mypy
 
 format: need-python
-	$(ENV) ruff check --fix .
-	$(ENV) ruff format .
+	$(DEV) ruff check --fix .
+	$(DEV) ruff format .
 
 # The pictures of the manual, made without a display.
 screenshots: need-python
-	$(ENV) python tools/screenshots.py
+	$(DEV) python tools/screenshots.py
 
 setup: need-python
-	$(ENV)
+	$(DEV)
 
 need-python:
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or 3.12 is needed (on Debian 12: apt-get install python3 python3-venv)." >&2; exit 1; }

@@ -1,8 +1,9 @@
-"""Set up everything Markerscope needs, then run a command in it: ``python3 tools/setup_env.py [COMMAND ...]``.
+"""Set up everything Markerscope needs, then run a command: ``python3 tools/setup_env.py [--dev] [COMMAND ...]``.
 
-Makes ``.venv`` beside this folder with the versions of ``constraints.txt``, and on Debian, as root, installs the
-missing system libraries; another user is shown the exact line to run. A second run finds nothing to do and is instant.
-Uses the standard library alone and starts on any Python 3, so that it can say which one is needed.
+Makes ``.venv`` beside this folder with the versions of ``constraints.txt``, with ``--dev`` the tools for tests and
+development too, and on Debian, as root, installs the missing system libraries; another user is shown the exact line to
+run. A second run finds nothing to do and is instant. Uses the standard library alone and starts on any Python 3, so
+that it can say which one is needed.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+
+import torch_build
 
 ROOT = Path(__file__).resolve().parents[1]
 VENV = ROOT / ".venv"
@@ -52,16 +55,25 @@ WINDOW_PROGRAMS = {"xvfb": "Xvfb", "xauth": "xauth"}
 """What the tests open a real window with where there is no screen."""
 
 
+PROGRAM_MB, DEVELOPMENT_MB = 480, 190
+"""Downloads on Linux x86-64, without torch: the program and what it needs; tools for tests and development."""
+
+WITH_TOOLS = " with development tools\n"
+"""End of the stamp of an environment that holds them."""
+
+
 def main(command: list[str]) -> int:
     """Set up what is missing, then run ``command`` in the environment."""
     if sys.version_info[:2] not in SUPPORTED:
         return with_supported_python(command)
-    wanted = fingerprint()
-    if not (PYTHON.exists() and STAMP.exists() and STAMP.read_text(encoding="utf-8") == wanted):
-        install_system_libraries()
+    development = command[:1] == ["--dev"]
+    command = command[1:] if development else command
+    if not is_set_up(development):
+        install_system_libraries(development)
         make_environment()
-        install_packages()
-        STAMP.write_text(wanted, encoding="utf-8")
+        development = development or is_set_up(True, stale=True)
+        install_packages(development)
+        STAMP.write_text(fingerprint(development), encoding="utf-8")
     return run_in_environment(command) if command else 0
 
 
@@ -90,12 +102,25 @@ def with_supported_python(command: list[str]) -> int:
     sys.exit(f"setup: Python 3.11 or 3.12 is needed and this is {have}; install one of them{how} and run this again.")
 
 
-def fingerprint() -> str:
-    """What the environment was made from; another answer means it must be made again."""
+def is_set_up(development: bool, stale: bool = False) -> bool:
+    """Whether the environment holds what is asked for: one with the development tools holds the program as well.
+
+    With ``stale`` only whether it held that once, whatever it was made from.
+    """
+    if not (PYTHON.exists() and STAMP.exists()):
+        return False
+    found = STAMP.read_text(encoding="utf-8")
+    if stale:
+        return not development or found.endswith(WITH_TOOLS)
+    return found == fingerprint(True) or (not development and found == fingerprint(False))
+
+
+def fingerprint(development: bool) -> str:
+    """What the environment was made from and what for; another answer means it must be made again."""
     digest = hashlib.sha256()
-    for part in (ROOT / "pyproject.toml", ROOT / "constraints.txt", Path(__file__)):
+    for part in (ROOT / "pyproject.toml", ROOT / "constraints.txt", Path(__file__), Path(torch_build.__file__)):
         digest.update(part.read_bytes())
-    return f"{digest.hexdigest()} {ROOT} {sys.version.split()[0]}\n"
+    return f"{digest.hexdigest()} {ROOT} {sys.version.split()[0]}{WITH_TOOLS if development else chr(10)}"
 
 
 def has_library(name: str) -> bool:
@@ -107,13 +132,14 @@ def has_library(name: str) -> bool:
     return True
 
 
-def install_system_libraries() -> None:
+def install_system_libraries(development: bool) -> None:
     """Install what no Python package carries, or say how to."""
     if not sys.platform.startswith("linux"):
         return
     needed = [package for package, library in LIBRARIES.items() if not has_library(library)]
     wished = [package for package, library in WINDOW_LIBRARIES.items() if not has_library(library)]
-    wished += [package for package, program in WINDOW_PROGRAMS.items() if not shutil.which(program)]
+    if development:
+        wished += [package for package, program in WINDOW_PROGRAMS.items() if not shutil.which(program)]
     if not has_venv():
         needed.append(f"python3.{sys.version_info[1]}-venv")
     missing = needed + wished
@@ -151,13 +177,21 @@ def make_environment() -> None:
     run(sys.executable, "-m", "venv", VENV)
 
 
-def install_packages() -> None:
-    """Install Markerscope with its test and development tools, at the versions of ``constraints.txt``."""
-    say("installing the pinned packages; this takes a few minutes the first time")
+def install_packages(development: bool) -> None:
+    """Install Markerscope, and its test and development tools if asked for, at the versions of ``constraints.txt``."""
     pip = (PYTHON, "-m", "pip", "--disable-pip-version-check")
-    constraints = ("--constraint", ROOT / "constraints.txt")
-    run(*pip, "install", "--quiet", *constraints, "pip", "setuptools")
-    run(*pip, "install", *constraints, "--editable", f"{ROOT}[test,dev]")
+    constraints = ROOT / "constraints.txt"
+    run(*pip, "install", "--quiet", "--constraint", constraints, "pip", "setuptools")
+    version = torch_build.wanted_version(constraints)
+    there = torch_build.installed_version(PYTHON).split("+")[0] == version
+    choice = torch_build.choose(there, torch_build.has_nvidia())
+    tools = DEVELOPMENT_MB if development else 0
+    say(choice.why)
+    say(f"downloading up to {PROGRAM_MB + tools + choice.megabytes} MB, once; this takes a few minutes")
+    if choice.index and not torch_build.fetch_cpu_build(pip, version, choice.index):
+        say(f"the download from {choice.index} failed, so torch is what pip finds: maybe the CUDA build, some 5 GB")
+    extras = "[test,dev]" if development else ""
+    run(*pip, "install", "--constraint", constraints, "--editable", f"{ROOT}{extras}")
     run(*pip, "check")
 
 
