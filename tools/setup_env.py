@@ -179,7 +179,7 @@ def make_environment() -> None:
 
 def install_packages(development: bool) -> None:
     """Install Markerscope, and its test and development tools if asked for, at the versions of ``constraints.txt``."""
-    pip = (PYTHON, "-m", "pip", "--disable-pip-version-check")
+    pip = (PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-cache-dir")  # else every package lies here twice
     constraints = ROOT / "constraints.txt"
     run(*pip, "install", "--quiet", "--constraint", constraints, "pip", "setuptools")
     version = torch_build.wanted_version(constraints)
@@ -191,7 +191,8 @@ def install_packages(development: bool) -> None:
     if choice.index and not torch_build.fetch_cpu_build(pip, version, choice.index):
         say(f"the download from {choice.index} failed, so torch is what pip finds: maybe the CUDA build, some 5 GB")
     extras = "[test,dev]" if development else ""
-    run(*pip, "install", "--constraint", constraints, "--editable", f"{ROOT}{extras}")
+    # Python compiles the tenth of the modules that is used as it is first imported.
+    run(*pip, "install", "--no-compile", "--constraint", constraints, "--editable", f"{ROOT}{extras}")
     run(*pip, "check")
 
 

@@ -94,6 +94,6 @@ def wanted_version(constraints: Path) -> str:
 
 def fetch_cpu_build(pip: Sequence[str | Path], version: str, index: str) -> bool:
     """Install torch alone from the index; False, with nothing changed, where the download fails or stands still."""
-    line = [*pip, "install", "--no-deps", "--timeout", STALL_S, "--retries", 1, "--index-url", index]
+    line = [*pip, "install", "--no-deps", "--no-compile", "--timeout", STALL_S, "--retries", 1, "--index-url", index]
     words = [str(word) for word in (*line, f"torch=={version}")]
     return subprocess.run(words, stdin=subprocess.DEVNULL, stdout=sys.stderr).returncode == 0
