@@ -15,6 +15,7 @@ from solver.solve.state import Energies
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = sorted(DOCS.glob("*.md"))
+TABLES = sorted((DOCS / "benchmarks").glob("*.md"))
 
 
 def anchors(page: Path) -> set[str]:
@@ -23,7 +24,7 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
-@pytest.mark.parametrize("page", [*PAGES, DOCS.parent / "README.md"], ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [*PAGES, *TABLES, DOCS.parent / "README.md"], ids=lambda page: page.name)
 def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\((?!https?:)([^)]+)\)", page.read_text(encoding="utf-8")):
         path, _, anchor = target.partition("#")
@@ -35,6 +36,11 @@ def test_links_lead_somewhere(page: Path) -> None:
 def test_every_page_can_be_found_from_the_first() -> None:
     first = (DOCS / "index.md").read_text(encoding="utf-8")
     assert {page.name for page in PAGES} == {"index.md"} | set(re.findall(r"\]\((\w[\w-]*\.md)\)", first))
+
+
+def test_every_table_can_be_found_from_the_first() -> None:
+    first = (DOCS / "benchmarks" / "index.md").read_text(encoding="utf-8")
+    assert {page.name for page in TABLES} == {"index.md"} | set(re.findall(r"\]\((\w[\w-]*\.md)\)", first))
 
 
 def said(default: object) -> str | None:

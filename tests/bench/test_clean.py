@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.cli import main
-from benchmarks.readme import put
+from benchmarks.insert import put
 from solver.bench.clean import _outliers, resampled, run_clean_bench
 from solver.errors import InputError
 from solver.io.export_c3d import write_c3d
@@ -80,14 +80,14 @@ def test_resampling_keeps_a_cubic_and_what_is_lost() -> None:
     assert np.array_equal(resampled(positions, 100.0, 50.0), positions[::2], equal_nan=True)
 
 
-def test_the_command_leaves_a_table_for_the_readme(tmp_path: Path) -> None:
+def test_the_command_leaves_a_table_for_its_page(tmp_path: Path) -> None:
     (tmp_path / "recordings").mkdir()
     recording(tmp_path / "recordings" / "swing.c3d")
     words = ["bench", "clean", "--motions", str(tmp_path / "recordings"), "--out", str(tmp_path / "out"), "--quiet"]
     assert main(words) == 0
     readme = tmp_path / "README.md"
     readme.write_text("<!-- bench:clean begin -->\n<!-- bench:clean end -->\n")
-    assert put(tmp_path / "out", readme) == "clean"
+    assert put(tmp_path / "out", [readme]) == ("clean", readme)
     text = readme.read_text()
     assert "`markerscope bench clean --motions recordings`" in text
     assert "| swing | 300 x 12 | 5 % | regression |" in text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from app.cli import main
-from benchmarks.readme import put
+from benchmarks.insert import PAGES, put
 from solver.bench import motions
 from solver.bench.cases import SUITES, cases_of
 from solver.bench.motions import find_motions, read_source
@@ -78,18 +79,26 @@ def test_runs_out_of_time_are_counted(tmp_path: Path, capsys) -> None:
     assert "1 x bundle, timed out: It took more than 0.05 s." in text
 
 
-def test_the_readme_gets_the_table_between_its_marks(out: Path, tmp_path: Path) -> None:
+def test_the_page_gets_the_table_between_its_marks(out: Path, tmp_path: Path) -> None:
     readme = tmp_path / "README.md"
     readme.write_text("# Title\n<!-- bench:short begin -->\nearlier\n<!-- bench:short end -->\nrest\n")
-    assert put(out, readme) == "short"
+    other = tmp_path / "other.md"
+    other.write_text("# Other\n")
+    assert put(out, [other, readme]) == ("short", readme)
     text = readme.read_text()
     assert "earlier" not in text
     assert (out / "bench.md").read_text().strip() in text
     assert text.startswith("# Title\n<!-- bench:short begin -->\n")
     assert text.endswith("\n<!-- bench:short end -->\nrest\n")
     readme.write_text("# Title\n")
-    with pytest.raises(InputError, match="no marks"):
-        put(out, readme)
+    with pytest.raises(InputError, match="no page has marks"):
+        put(out, [other, readme])
+
+
+def test_every_table_has_one_place() -> None:
+    names = [name for page in PAGES for name in re.findall(r"<!-- bench:([\w-]+) begin -->", page.read_text())]
+    assert len(names) == len(set(names))
+    assert {"accuracy", "parts", "scaling", "ablation", "clean", "neural", "squat", "window"} <= set(names)
 
 
 @pytest.mark.parametrize(
