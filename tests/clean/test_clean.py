@@ -80,6 +80,15 @@ def test_what_is_kept_is_not_cut_and_nothing_is_done_that_was_not_asked_for() ->
     assert not idle.proposals
 
 
+@pytest.mark.parametrize(("first", "last", "cut"), [(80, 80, 0), (76, 80, 0), (80, 84, 0), (75, 79, 1), (81, 90, 1)])
+def test_the_frames_to_keep_are_meant_with_both_ends(first: int, last: int, cut: int) -> None:
+    markers = damaged()
+    kept = clean(markers, CleanSettings(keep=((3, first, last),), fill_gaps=False))
+    assert int(kept.outliers.mask(markers.present.shape)[80, 3]) == cut
+    assert not clean(markers, CleanSettings(keep=((2, 80, 80),))).outliers.mask(markers.present.shape)[80, 2]
+    assert clean(markers, CleanSettings(keep=((2, 80, 80),))).outliers.mask(markers.present.shape)[80, 3]
+
+
 def test_a_recording_without_any_sample_is_refused() -> None:
     with pytest.raises(InputError, match="every sample is lost"):
         clean(of(np.full((10, 3, 3), np.nan)))
