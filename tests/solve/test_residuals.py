@@ -89,10 +89,10 @@ def test_a_marker_costs_what_geman_and_mcclure_say() -> None:
     residual, weight, cost = marker_residual(where, target, present, weights)
     np.testing.assert_array_equal(residual, where)
     np.testing.assert_allclose(cost[0], [9 * 0.5, 9 * (1 / 9) / (10 / 9), 9 * (1 - 1e-4), 0.0], rtol=1e-4)
-    step = 1e-7
-    risen = marker_residual(where + [step, 0, 0], target, present, weights)[2][0, 0]
-    fallen = marker_residual(where - [step, 0, 0], target, present, weights)[2][0, 0]
-    assert weight[0, 0] * 0.03 == pytest.approx((risen - fallen) / (4 * step), rel=1e-5)
+    step = np.array([1e-7, 0, 0])
+    risen = marker_residual(where + step, target, present, weights)[2][0, 0]
+    fallen = marker_residual(where - step, target, present, weights)[2][0, 0]
+    assert weight[0, 0] * 0.03 == pytest.approx((risen - fallen) / 4e-7, rel=1e-5)
     assert weight[0, 3] == 0
 
 
