@@ -25,7 +25,8 @@ def candidate(energy: float, bones: list[int], swing_deg: float) -> Candidate:
         hypothesis=0, refined=True, energies=shares, energy=energy, bone=np.array(bones), vertex=np.arange(count),
         part="left leg", heading_deg=0.0, camera=CameraResult(np.eye(3), np.zeros(3), 900.0, (640, 480), 4.0),
         rest=nowhere, dirs=np.zeros((count, 3, 10)), weights=np.eye(24)[bones], surface=nowhere,
-        normal=np.tile([0.0, 0, 1], (count, 1)), betas=np.zeros(10), rotations=rotations, trans=np.zeros((50, 3)), trace=(energy,),
+        normal=np.tile([0.0, 0, 1], (count, 1)), betas=np.zeros(10), rotations=rotations, trans=np.zeros((50, 3)),
+        trace=(energy,),
     )  # fmt: skip
 
 
