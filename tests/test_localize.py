@@ -93,11 +93,24 @@ def test_a_lab_that_lies_on_its_side_is_tried_only_when_asked() -> None:
 def test_equal_answers_are_named_once_best_first() -> None:
     points, bone = body()
     markers, _ = laid(points, R_LAB_UPRIGHT_CAMERA)
+    markers = markers + np.random.default_rng(2).normal(0, 0.15, (1, PLACES, 3))
     every = hypotheses(markers, points, np.arange(PLACES), bone, Search(yaws=8, rounds=12))
+    assert len(every) > 3, "other headings and other bones are answers too"
     costs = [one.cost for one in every]
     assert costs == sorted(costs)
+    assert costs[-1] <= costs[0] * (1 + 2 / np.sqrt(PLACES)) ** 2, "nine markers tell two thirds apart"
     for i, one in enumerate(every):
         for other in every[:i]:
             apart = np.degrees(np.arccos(np.clip((np.trace(one.R_lab_cam.T @ other.R_lab_cam) - 1) / 2, -1, 1)))
             assert apart > 14.9 or (bone[one.vertex] == bone[other.vertex]).mean() <= 0.8
     assert len(hypotheses(markers, points, np.arange(PLACES), bone, Search(yaws=8, keep=1))) == 1
+
+
+def test_no_more_are_named_than_asked_for() -> None:
+    points, bone = body()
+    markers, _ = laid(points, R_LAB_UPRIGHT_CAMERA)
+    markers = markers + np.random.default_rng(2).normal(0, 0.15, (1, PLACES, 3))
+    every = hypotheses(markers, points, np.arange(PLACES), bone, Search(yaws=8))
+    for keep in (1, 2, 3):
+        some = hypotheses(markers, points, np.arange(PLACES), bone, Search(yaws=8, keep=keep))
+        assert [one.cost for one in some] == [one.cost for one in every[:keep]]
