@@ -60,6 +60,10 @@ def test_slope_is_the_finite_difference_of_the_cost(free_body: Body) -> None:
     for column in rng.choice(3 * len(FREE) + 3, 20, replace=False):
         expected, found = slope(2, int(column)), sums.g_f[2, column]
         assert abs(expected - found) < 1e-3 + 1e-4 * abs(expected), f"pose column {column}: {found} for {expected}"
+    places = range(problem.placement_at.start, problem.placement_at.stop)
+    for column in places:
+        expected, found = slope(None, column), sums.g_s[column]
+        assert abs(expected - found) < 1e-3 + 1e-4 * abs(expected), f"place column {column}: {found} for {expected}"
     # A marker's height over the skin is linearised with the skin held, so shape columns leave that term out.
     blind = replace(weights, offset_spread=1e6)
     sums = problem.linearised(state, blind, surface)
@@ -150,8 +154,32 @@ def test_the_energies_are_the_sums_that_their_names_say(free_body: Body) -> None
 def test_a_video_that_lost_the_person_counts_less(free_body: Body) -> None:
     """Its poses are bridged there: they weigh 0.15 of the others."""
     problem, state, surface, weights = _problem(free_body)
-    state = replace(state, bias=np.tile(np.eye(3), (len(FREE), 1, 1)))
+    turned = state.pose.rotations @ exp_so3(np.array([0.1, 0.05, -0.2]))
+    pose = replace(state.pose, rotations=turned)
+    state = replace(state, pose=pose, bias=np.tile(np.eye(3), (len(FREE), 1, 1)))
     lost = Problem(free_body, replace(problem.seen, tracked=np.zeros(4, dtype=bool)), problem.landmarks)
     seen, filled = (one.energies(state, weights, surface) for one in (problem, lost))
+    assert seen.prior > 1
     assert filled.prior == pytest.approx(0.15 * seen.prior)
     assert filled.image == 0, "nor are its landmarks believed"
+
+
+def test_what_is_said_of_the_landmarks_is_the_median_over_those_in_sight(free_body: Body) -> None:
+    problem, state, _, _ = _problem(free_body)
+    places = place_points(problem.landmarks, forward(free_body, state.pose), state.pose.betas)
+    image = state.camera.project(places, (720, 960))
+    off = np.random.default_rng(0).normal(0, 9, image.shape)
+    off[0, :4] = 1e4
+    off[2] *= 30
+    missing = np.zeros(image.shape[:2], dtype=bool)
+    missing[1, 5:] = missing[3, ::2] = True
+    image = np.where(missing[..., None], np.nan, image + off)
+    tracked = np.array([True, True, False, True])
+    seen = Problem(free_body, replace(problem.seen, image=image, tracked=tracked), problem.landmarks)
+    there = ~missing & tracked[:, None]
+    assert seen.reprojection(state) == pytest.approx(np.median(np.linalg.norm(off, axis=2)[there]))
+    extent = [np.linalg.norm(np.nanmax(image[f], 0) - np.nanmin(image[f], 0)) for f in (0, 1, 3)]
+    assert seen.person == pytest.approx(np.median(extent))
+    nobody = Problem(free_body, replace(problem.seen, image=np.full_like(image, np.nan)), problem.landmarks)
+    assert nobody.person == 50
+    assert np.isnan(nobody.reprojection(state))

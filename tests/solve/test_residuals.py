@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 from solver.body.model import Body
+from solver.body.skeleton import INDEX
+from solver.rotations import exp_so3
+from solver.solve.anatomical import mean_pose
 from solver.solve.bundle import reattach
 from solver.solve.kinematics import Points, forward, place_points
 from solver.solve.placement import Skin
 from solver.solve.problem import Problem
-from solver.solve.residuals import image_residual, marker_residual
-from solver.solve.state import Camera, State, Surface, Weights
+from solver.solve.residuals import focal_residual, habit_residual, image_residual, marker_residual, video_residual
+from solver.solve.state import FREE, Camera, State, Surface, Weights
 from tests.solve.conftest import Scene, simulate
 
 MARKERS = 12
@@ -119,3 +122,50 @@ def test_markers_let_go_of_their_skin_and_set_on_it_again_stay_where_they_are(fr
     assert np.median(np.abs(height - 0.0095)) < 0.002
     assert isinstance(again.placement, Points)
     np.testing.assert_allclose(again.placement.weights.sum(axis=1), 1)
+
+
+def test_a_joint_costs_what_cauchy_says_of_its_turn_from_the_video_less_the_bias(free_body: Body) -> None:
+    """k log(1 + a^2 / k) / s^2 for a turn a, s the spread and k = (3 s)^2; the root has a spread of its own."""
+    scene, state, _, weights = at_truth(free_body)
+    turned, biased, root = np.radians([30.0, 10.0, 40.0])
+    prior = scene.pose.rotations.copy()
+    prior[:, INDEX["left_knee"]] @= exp_so3(np.array([-turned, 0, 0]))
+    prior[:, 0] = state.camera.R_lab_cam.T @ prior[:, 0] @ exp_so3(np.array([0, 0, -root]))
+    bias = state.bias.copy()
+    bias[list(FREE).index(INDEX["left_knee"])] = exp_so3(np.array([biased, 0, 0]))
+    residual, weight, cost = video_residual(replace(scene.seen, prior=prior), replace(state, bias=bias), weights)
+    expected = np.zeros(len(FREE))
+    for name, angle, spread_deg in (("left_knee", turned - biased, 18.0), ("pelvis", root, 25.0)):
+        at = list(FREE).index(INDEX[name])
+        spread = np.radians(spread_deg)
+        assert np.linalg.norm(residual[0, at]) == pytest.approx(angle)
+        expected[at] = 9 * np.log1p((angle / spread) ** 2 / 9)
+        assert weight[0, at] == pytest.approx(1 / spread**2 / (1 + (angle / spread) ** 2 / 9))
+    np.testing.assert_allclose(cost[0], expected, atol=1e-12)
+
+
+def test_a_pose_costs_by_how_far_it_is_from_the_relaxed_one_axis_by_axis(free_body: Body) -> None:
+    _, state, _, weights = at_truth(free_body)
+    relaxed = np.repeat(mean_pose()[None], 5, axis=0)
+    rotations = relaxed.copy()
+    rotations[:, INDEX["left_knee"]] @= exp_so3(np.radians([30.0, 0, 0]))
+    rotations[:, INDEX["right_knee"]] @= exp_so3(np.radians([0, 30.0, 0]))
+    _, weight, cost = habit_residual(replace(state, pose=replace(state.pose, rotations=rotations)), weights)
+    left, right = (list(FREE).index(INDEX[f"{side}_knee"]) for side in ("left", "right"))
+    assert cost[0, left].sum() == pytest.approx(0.3 * (30 / 60) ** 2)
+    assert cost[0, right].sum() == pytest.approx(0.3 * (30 / 10) ** 2)
+    assert cost[0].sum() == pytest.approx(cost[0, [left, right]].sum())
+    assert weight[left, 0] == pytest.approx(0.3 / np.radians(60) ** 2)
+
+
+def test_points_nearer_than_the_lens_can_see_are_projected_from_there() -> None:
+    camera = Camera(np.eye(3), np.zeros(3), np.zeros(3), 100.0)
+    local = np.array([[[0.1, 0, 0.4], [0.1, 0, 0.1], [0.1, 0, -3.0]]])
+    nothing, seen = np.zeros((1, 3, 2)), np.ones((1, 3))
+    residual, _, _ = image_residual(local, camera, nothing, seen, 400.0, (0, 0), Weights())
+    np.testing.assert_allclose(residual[0, :, 0], [25, 50, 50])
+
+
+def test_the_focal_length_is_told_by_its_logarithm() -> None:
+    camera = Camera(np.eye(3), np.zeros(3), np.zeros(3), 0.85 * 1280 * np.e)
+    assert focal_residual(camera, (720, 1280), Weights()) == pytest.approx(1.0)
