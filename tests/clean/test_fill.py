@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from scipy.linalg import orthogonal_procrustes
+from scipy.spatial.transform import Rotation
 
 from solver.clean.fill import METHODS, fill
 from solver.clean.fill.body import fill_by_body
@@ -178,6 +179,40 @@ def test_neighbours_are_those_of_least_spread_in_their_order() -> None:
     rng = np.random.default_rng(1)
     truth = rigid(300, 6) + rng.normal(size=(300, 6, 3)) * np.array([0, 3, 1, 5, 2, 4])[:, None] * 1e-3
     assert neighbours_of(truth).nearest(0, np.ones(6, dtype=bool), 3).tolist() == [2, 4, 1]
+
+
+def test_the_rigid_filling_weighs_neighbours_by_how_they_keep_their_distance() -> None:
+    """1 / (spread + 1 mm)^2, as documented; the turns here are scipy's."""
+    rng = np.random.default_rng(5)
+    truth = rigid(240, 7, 5) + rng.normal(size=(240, 7, 3)) * np.array([0, 1, 2, 4, 8, 3, 6])[:, None] * 1e-3
+    given = lose(truth, (0, 100, 119))
+    seen = np.setdiff1d(np.arange(240), np.arange(100, 120))
+    spread = np.linalg.norm(truth - truth[:, [0]], axis=2)[seen].std(axis=0)[1:]
+    weight = 1 / (spread + 0.001) ** 2
+    near = seen[np.sort(np.argsort(np.maximum(100 - seen, seen - 119), kind="stable")[:60])]  # as many tell its place
+
+    def framed(frame: int, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        centre = np.average(truth[frame, 1:], axis=0, weights=weight)
+        turn, _ = Rotation.align_vectors(truth[frame, 1:] - centre, reference, weights=weight)
+        return turn.as_matrix(), centre
+
+    reference = truth[near[0], 1:] - np.average(truth[near[0], 1:], axis=0, weights=weight)
+    local = {}
+    for frame in near:
+        turn, centre = framed(int(frame), reference)
+        local[int(frame)] = turn.T @ (truth[frame, 0] - centre)
+    expected = []
+    for frame in range(100, 120):
+        share = (frame - 99) / 21
+        turn, centre = framed(frame, reference)
+        expected.append(turn @ ((1 - share) * local[99] + share * local[120]) + centre)
+    found = fill(given, RATE, FillSettings(method="rigid", min_confidence=0.0))
+    np.testing.assert_allclose(found.positions[100:120, 0], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize(("error", "said"), [(0.001, 0.95), (0.010, 0.61), (0.0322, 0.20)])
+def test_the_confidence_is_the_one_that_the_documentation_tells(error: float, said: float) -> None:
+    assert confidence_of(error) == pytest.approx(said, abs=0.005)
 
 
 def test_confidence_falls_where_the_error_rises() -> None:
