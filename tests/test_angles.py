@@ -370,6 +370,18 @@ def test_who_faces_another_way_is_read_there_where_the_convention_says_so() -> N
     assert angles_of("opensim", pelvis=lean)["pelvis_tilt"] == pytest.approx(15), "OpenSim tilts about the lab's axis"
 
 
+@pytest.mark.parametrize("heading", [-160, -90, -50, -40, 0, 40, 50, 90, 160])
+def test_quarter_turns_leave_what_the_subject_turns_beyond_them(heading: int) -> None:
+    """To either side: the pelvis then reads as if the trial had been walked along the lab's first axis."""
+    lean = turn(y=heading) @ turn(x=15)
+    beyond = heading - 90 * round(heading / 90)
+    as_walked = angles_of("visual3d", pelvis=turn(y=beyond) @ turn(x=15))
+    for axis in "XYZ":
+        found = angles_of("visual3d", pelvis=lean)[f"PELVIS_ANGLE_{axis}"]
+        assert found == pytest.approx(as_walked[f"PELVIS_ANGLE_{axis}"], abs=1e-6), f"{axis} heading {heading}"
+    assert angles_of("plugin-gait", pelvis=turn(y=heading))["RPelvisAnglesX"] == pytest.approx(0, abs=1e-6)
+
+
 # -- the real body ---------------------------------------------------------------------------------------------
 
 

@@ -76,6 +76,15 @@ def test_a_shift_is_found_in_joints_and_surface_alone(tmp_path: Path, body: Body
     assert figures["mpjve_mm_s"] == pytest.approx(0, abs=1e-6)
 
 
+def test_a_drift_is_a_velocity_in_every_joint(tmp_path: Path, body: Body) -> None:
+    poses, trans = moving()
+    drift = np.arange(FRAMES)[:, None] / RATE * np.array([0.03, 0.0, 0.04])
+    result = write(tmp_path / "a.npz", body, poses, trans + drift)
+    figures = summary_of(evaluate(result, write(tmp_path / "b.npz", body, poses, trans)))
+    assert figures["mpjve_mm_s"] == pytest.approx(50)
+    assert figures["mpjpe_mm"] == pytest.approx(50 * (FRAMES - 1) / RATE / 2)
+
+
 def test_a_bent_knee_is_found_in_its_angle(tmp_path: Path, body: Body) -> None:
     poses, trans = moving()
     poses[:, INDEX["left_knee"]] = 0

@@ -151,6 +151,22 @@ def test_two_halves_without_a_common_marker_are_not_joined() -> None:
     assert np.isnan(found.affinity[0, 10])
 
 
+@pytest.mark.parametrize(("together", "measured"), [(9, False), (10, True), (15, True)])
+def test_a_pair_is_measured_where_ten_compared_frames_show_both(together: int, measured: bool) -> None:
+    """Few frames show any two markers as rigid; then the way over the others counts."""
+    positions, owner = rigid_bodies(frames=120)
+    positions[: 60 - together // 2, 0] = np.nan
+    positions[60 + together - together // 2 :, 4] = np.nan  # of the next body
+    found = segment(markers(positions))
+    assert found.overlap[0, 4] == together
+    assert found.measured[0, 4] == measured
+    if not measured:
+        assert found.affinity[0, 4] >= np.sort(found.affinity[0, owner == 1])[0] - 1e-12
+        assert found.affinity[0, 4] != affinity(positions).deviation[0, 4]
+    short = segment(markers(positions[60 - together // 2 : 64 - together // 2]))
+    assert short.measured[0, 4], "a recording of four frames has no more of them"
+
+
 def test_a_marker_that_is_never_seen_belongs_to_no_group() -> None:
     positions, owner = rigid_bodies()
     positions[:, 2] = np.nan

@@ -189,3 +189,52 @@ def test_the_real_squat(shared_data: Path, squat_landmarks: Landmarks, only: str
     error = abs(found.offset + 0.010)
     assert error < limit, f"{error:.4f} s off"
     assert found.confidence > 0.9
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("shift", [0.0, 0.0025, 0.005, 0.0075])
+def test_the_offset_is_found_between_the_steps_of_the_search(seed: int, shift: float) -> None:
+    """Steps are 10 ms apart; what is left of a clean recording's error is a fraction of one."""
+    path = dancer(seed + 20)
+    offset = OFFSET + shift
+    video = filmed(path, offset + np.arange(0, 8, 1 / 30), seed, noise=0.5)
+    found = find_offset(video, captured(path, np.arange(0, 10, 0.01), seed))
+    assert abs(found.offset - offset) < 0.0015, f"{1e3 * (found.offset - offset):+.2f} ms off"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_movement_that_is_done_twice_alike_fits_at_both_times(seed: int) -> None:
+    """Nothing else is as good, the video played backwards least of all; but which of the two it was, nobody knows."""
+    once = dancer(seed + 30)
+    twice = lambda time: once(np.mod(time, 6.0))  # noqa: E731
+    video = filmed(twice, np.arange(1.0, 5.0, 1 / 30), seed)
+    found = find_offset(video, captured(twice, np.arange(0, 12, 0.01), seed))
+    assert min(abs(found.offset - 1.0), abs(found.offset - 7.0)) < 0.02
+    assert found.margin < 3
+    assert found.confidence < 0.2
+    assert "give the offset" in found.notes[0]
+    rival = 1.0 if found.offset > 4 else 7.0
+    said = float(found.notes[0].split("hardly better than ")[1].split(" s;")[0])
+    assert said == pytest.approx(rival, abs=0.06)
+
+
+def test_recordings_of_other_movements_are_hardly_ever_believed() -> None:
+    """Short ones fit somewhere by chance, and the video played backwards fits as well somewhere."""
+    stated = []
+    for seed in range(12):
+        video = filmed(dancer(seed), np.arange(0, 4, 1 / 30), seed)
+        stated.append(find_offset(video, captured(dancer(seed + 70), np.arange(0, 4, 0.01), seed)).confidence)
+    assert np.mean(stated) < 0.15, np.round(stated, 2)
+    assert max(stated) < 0.6, np.round(stated, 2)
+
+
+def test_offsets_are_judged_where_a_second_or_more_is_shared() -> None:
+    path = dancer(11)
+    video = filmed(path, OFFSET + np.arange(0, 8, 1 / 30), 11)
+    markers = captured(path, np.arange(0, 10, 0.01), 11)
+    found = find_offset(video, markers, search=(-8.5, 10.5))
+    shared = np.minimum(found.lags + video.time[-1], markers.time[-1]) - np.maximum(found.lags, 0.0)
+    judged = np.isfinite(found.score)
+    assert judged[shared > 1.07].all()
+    assert not judged[shared < 0.93].any()
+    assert abs(found.offset - OFFSET) < 0.01

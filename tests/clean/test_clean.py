@@ -11,6 +11,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from solver.clean.clean import Cleaned, CleanSettings, clean, put_back
+from solver.clean.gaps import FillSettings
 from solver.clean.outliers import OutlierSettings
 from solver.clean.swaps import Proposal, apply_proposals, find_proposals
 from solver.errors import InputError
@@ -78,6 +79,28 @@ def test_what_is_kept_is_not_cut_and_nothing_is_done_that_was_not_asked_for() ->
     assert np.array_equal(idle.markers.positions, markers.positions, equal_nan=True)
     assert not idle.fills
     assert not idle.proposals
+
+
+@pytest.mark.parametrize(("first", "last", "cut"), [(80, 80, 0), (76, 80, 0), (80, 84, 0), (75, 79, 1), (81, 90, 1)])
+def test_the_frames_to_keep_are_meant_with_both_ends(first: int, last: int, cut: int) -> None:
+    markers = damaged()
+    kept = clean(markers, CleanSettings(keep=((3, first, last),), fill_gaps=False))
+    assert int(kept.outliers.mask(markers.present.shape)[80, 3]) == cut
+    assert not clean(markers, CleanSettings(keep=((2, 80, 80),))).outliers.mask(markers.present.shape)[80, 2]
+    assert clean(markers, CleanSettings(keep=((2, 80, 80),))).outliers.mask(markers.present.shape)[80, 3]
+
+
+def test_what_was_done_and_what_was_left_is_counted() -> None:
+    lost = lose(damaged().positions, (5, 0, 239), (0, 10, 19), (4, 100, 239))
+    cleaned = clean(of(lost), CleanSettings(fill=FillSettings(method="rigid", max_gap=1.0)))
+    assert cleaned.notes[0] == "1 samples of 1 markers were cut as outliers."
+    counts = [fill.length for fill in cleaned.fills]
+    assert sorted(counts) == [1, 2, 10, 31]
+    assert cleaned.notes[1].startswith("4 gaps (44 samples) were filled; expected error ")
+    mean = sum(fill.error * fill.length for fill in cleaned.fills) / 44
+    assert cleaned.notes[1].endswith(f" {1000 * mean:.1f} mm.")
+    assert cleaned.notes[2] == "1 gaps (140 samples) are left as they were."
+    assert cleaned.notes[3] == "2 markers were never seen and stay lost."
 
 
 def test_a_recording_without_any_sample_is_refused() -> None:

@@ -67,3 +67,21 @@ def test_ends_that_disagree_make_it_rise_and_ends_that_agree_fall() -> None:
         errors.append(drift(frames, residual, span, ends(span)))
     assert (np.diff(errors) > 0).all(), errors
     assert errors[-1] < 2.1 * drift(frames, residual, span, ends(span)[:1]), "no more than twice what is usual"
+
+
+@pytest.mark.parametrize("length", [8, 20, 80, 160])
+def test_a_gap_longer_than_what_was_seen_is_judged_by_halves(length: int) -> None:
+    """A marker that drifts evenly and is not seen again is off by half of the way that it will have gone."""
+    frames = np.arange(30)
+    residual = 0.0005 * frames[:, None] * np.array([0.6, 0.0, 0.8])
+    span = gap(length, first=30)
+    found = drift(frames, residual, span, np.array([29]))
+    assert found == pytest.approx(0.0005 * length / 2, rel=0.12), f"{1e3 * found:.2f} mm for {length} frames"
+
+
+def test_a_marker_that_is_elsewhere_among_its_neighbours_afterwards_is_off_by_a_share_of_the_way() -> None:
+    frames = np.setdiff1d(np.arange(400), np.arange(200, 210))
+    residual = np.zeros((len(frames), 3))
+    residual[frames >= 210, 0] = 0.05
+    found = drift(frames, residual, gap(10, first=200), np.array([199, 210]), strain=0.15)
+    assert found == pytest.approx(0.15 * 0.05)

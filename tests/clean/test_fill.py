@@ -7,10 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from scipy.linalg import orthogonal_procrustes
+from scipy.spatial.transform import Rotation
 
 from solver.clean.fill import METHODS, fill
 from solver.clean.fill.body import fill_by_body
 from solver.clean.fill.edm import from_distances
+from solver.clean.fill.neighbours import neighbours_of
 from solver.clean.gaps import Fill, FillSettings, Gap, confidence_of, find_gaps
 from tests.clean.scenes import RATE, lose, rigid, soft, worst
 
@@ -102,6 +105,114 @@ def test_a_marker_never_seen_and_gaps_that_are_too_long_stay() -> None:
     found = fill(given, RATE, FillSettings(max_gap=0.5))
     assert [(f.marker, f.first, f.last) for f in found.fills] == [(3, 50, 79)]
     assert np.isnan(found.positions[:, 4]).all()
+
+
+@pytest.mark.parametrize("method", ["regression", "rigid", "edm", "pattern", "spline", "linear"])
+@pytest.mark.parametrize("rate", [30.0, 60.0, 120.0])
+def test_the_longest_gap_is_one_of_seconds_whatever_the_rate(method: str, rate: float) -> None:
+    longest = round(0.3 * rate)
+    given = lose(rigid(), (2, 50, 49 + longest), (5, 130, 130 + longest))
+    settings = FillSettings(method=method, max_gap=0.3, min_confidence=0.0)  # type: ignore[arg-type]
+    found = fill(given, rate, settings)
+    assert [(f.marker, f.first, f.last) for f in found.fills] == [(2, 50, 49 + longest)]
+
+
+def by_scaling(positions: np.ndarray, marker: int, first: int, last: int, neighbours: list[int]) -> np.ndarray:
+    """(L, 3) m by the text of Pan et al. (2023), section 3.1, frame by frame, with scipy's Procrustes."""
+    points = positions[:, [marker, *neighbours]]
+    squared = [((p[:, None] - p[None]) ** 2).sum(axis=2) for p in (points[first - 1], points[last + 1])]
+    out = []
+    for t in range(first, last + 1):
+        share = (t - first + 1) / (last - first + 2)
+        apart = (1 - share) * squared[0] + share * squared[1]
+        doubly = -0.5 * (apart - apart.mean(0) - apart.mean(1)[:, None] + apart.mean())
+        value, vector = np.linalg.eigh(doubly)
+        local = vector[:, -3:] * np.sqrt(value[-3:])
+        seen, middle = points[t, 1:], local[1:].mean(axis=0)
+        turn, _ = orthogonal_procrustes(local[1:] - middle, seen - seen.mean(axis=0))
+        out.append((local[0] - middle) @ turn + seen.mean(axis=0))
+    return np.array(out)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_distance_matrices_are_interpolated_over_six_neighbours_as_published(seed: int) -> None:
+    """Markers that breathe differently, so that it matters which neighbours count and that the distances change."""
+    rng = np.random.default_rng(seed)
+    truth = rigid(240, 10, seed)
+    time = np.arange(240)[:, None, None] / RATE
+    swell = rng.uniform(0.002, 0.012, (10, 1)) * rng.normal(size=(10, 3))
+    truth = truth + swell * np.sin(2 * np.pi * time * 0.4 + rng.uniform(0, 6, (10, 1)))
+    given = lose(truth, (4, 100, 139))
+    apart = np.linalg.norm(given - given[:, [4]], axis=2)
+    order = np.argsort(np.nanstd(apart, axis=0))
+    nearest = [int(m) for m in order if m != 4][:6]
+    found = fill(given, RATE, FillSettings(method="edm", min_confidence=0.0))
+    expected = by_scaling(given, 4, 100, 139, nearest)
+    np.testing.assert_allclose(found.positions[100:140, 4], expected, atol=1e-6)
+
+
+def test_distances_follow_a_marker_that_slides_to_the_other_end_of_the_gap() -> None:
+    truth = rigid(240, 9)
+    share = np.clip((np.arange(240) - 99) / 41, 0, 1)[:, None]
+    truth[:, 4] += 0.04 * share * (truth[:, 5] - truth[:, 0]) / np.linalg.norm(truth[0, 5] - truth[0, 0])
+    found = fill(lose(truth, (4, 100, 139)), RATE, FillSettings(method="edm", min_confidence=0.0))
+    off = np.linalg.norm(found.positions[100:140, 4] - truth[100:140, 4], axis=1)
+    assert off[[0, -1]].max() < 0.0005, "it meets both ends"
+    assert off.max() < 0.002, f"{1e3 * off.max():.2f} mm"
+
+
+@pytest.mark.parametrize(("together", "known"), [(4, False), (5, True)])
+def test_a_neighbour_is_one_that_five_frames_show_together_with_the_marker(together: int, known: bool) -> None:
+    """In fewer, any two markers keep their distance."""
+    truth = rigid(200, 5)
+    given = lose(truth, (0, 0, 99), (1, 100 + together, 199))
+    near = neighbours_of(given)
+    assert np.isfinite(near.spread[0, 1]) == known
+    usable = np.ones(5, dtype=bool)
+    assert (1 in near.nearest(0, usable, 4)) == known
+    assert 0 not in near.nearest(0, usable, 5)
+    usable[2] = False
+    assert 2 not in near.nearest(0, usable, 5)
+
+
+def test_neighbours_are_those_of_least_spread_in_their_order() -> None:
+    rng = np.random.default_rng(1)
+    truth = rigid(300, 6) + rng.normal(size=(300, 6, 3)) * np.array([0, 3, 1, 5, 2, 4])[:, None] * 1e-3
+    assert neighbours_of(truth).nearest(0, np.ones(6, dtype=bool), 3).tolist() == [2, 4, 1]
+
+
+def test_the_rigid_filling_weighs_neighbours_by_how_they_keep_their_distance() -> None:
+    """1 / (spread + 1 mm)^2, as documented; the turns here are scipy's."""
+    rng = np.random.default_rng(5)
+    truth = rigid(240, 7, 5) + rng.normal(size=(240, 7, 3)) * np.array([0, 1, 2, 4, 8, 3, 6])[:, None] * 1e-3
+    given = lose(truth, (0, 100, 119))
+    seen = np.setdiff1d(np.arange(240), np.arange(100, 120))
+    spread = np.linalg.norm(truth - truth[:, [0]], axis=2)[seen].std(axis=0)[1:]
+    weight = 1 / (spread + 0.001) ** 2
+    near = seen[np.sort(np.argsort(np.maximum(100 - seen, seen - 119), kind="stable")[:60])]  # as many tell its place
+
+    def framed(frame: int, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        centre = np.average(truth[frame, 1:], axis=0, weights=weight)
+        turn, _ = Rotation.align_vectors(truth[frame, 1:] - centre, reference, weights=weight)
+        return turn.as_matrix(), centre
+
+    reference = truth[near[0], 1:] - np.average(truth[near[0], 1:], axis=0, weights=weight)
+    local = {}
+    for frame in near:
+        turn, centre = framed(int(frame), reference)
+        local[int(frame)] = turn.T @ (truth[frame, 0] - centre)
+    expected = []
+    for frame in range(100, 120):
+        share = (frame - 99) / 21
+        turn, centre = framed(frame, reference)
+        expected.append(turn @ ((1 - share) * local[99] + share * local[120]) + centre)
+    found = fill(given, RATE, FillSettings(method="rigid", min_confidence=0.0))
+    np.testing.assert_allclose(found.positions[100:120, 0], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize(("error", "said"), [(0.001, 0.95), (0.010, 0.61), (0.0322, 0.20)])
+def test_the_confidence_is_the_one_that_the_documentation_tells(error: float, said: float) -> None:
+    assert confidence_of(error) == pytest.approx(said, abs=0.005)
 
 
 def test_confidence_falls_where_the_error_rises() -> None:

@@ -52,6 +52,22 @@ def test_frame_numbers_alone_show_gaps() -> None:
     np.testing.assert_array_equal(grid, [0, 1, np.nan, np.nan, 2, 3])
 
 
+def test_frame_numbers_that_count_in_tens_lie_ten_apart() -> None:
+    assert even_grid(None, np.array([10.0, 20, 30, 50]), 100.0).index.tolist() == [0, 1, 2, 4]
+
+
+@pytest.mark.parametrize("rate", [50.0, 60.0, 100.0, 120.0, 240.0])
+def test_a_whole_rate_comes_out_whole_of_a_rounded_column(rate: float) -> None:
+    assert even_grid(np.round(np.arange(997) / rate, 4), None, None).rate == rate
+
+
+def test_where_most_rows_are_missing_the_step_is_still_that_of_neighbours() -> None:
+    kept = np.array([0, 1, 4, 5, 9, 10, 14, 17, 18, 21, 25, 26, 30])
+    line = even_grid(kept / 100, None, None)
+    assert line.rate == 100
+    assert line.index.tolist() == kept.tolist()
+
+
 @pytest.mark.parametrize(
     "time", [[0.0, 0.1, 0.05, 0.2], [0.0, 0.0, 0.0], [0.0, 1e300, 2e300], [0.0, np.nan, 0.2], [5.0], [0.0, 1e-310, 1.0]]
 )

@@ -93,3 +93,30 @@ def test_movement_is_judged_where_the_markers_are() -> None:
     assert stillness(turning("left_knee", 60), leg[:1]), "one bone alone has no joint to tell it by"
     # 5th to 95th percentile of an even sweep
     assert movement_deg(turning("left_knee", 60), [INDEX["left_knee"]]) == pytest.approx(54, abs=0.5)
+
+
+def test_the_spreads_are_those_of_the_joints_that_two_markers_or_more_show(free_body: Body) -> None:
+    """Root mean squares over the marked joints and two more as they were believed, by hand; of one axis of three."""
+    scene = simulate(free_body, 3, frames=6, markers=8)
+    on = [0, 0, *(INDEX[name] for name in ("left_knee", "left_knee", "neck", "neck", "head", "right_knee"))]
+    bias, wander = np.zeros((24, 3)), np.zeros((6, 24, 3))
+    for name, turned, wandered in (("left_knee", 10, 6), ("neck", 20, 12), ("head", 70, 50), ("pelvis", 60, 40)):
+        bias[INDEX[name], 1] = np.radians(turned)
+        wander[:, INDEX[name], 1] = np.radians(wandered) * np.array([1, -1, 1, -1, 1, -1])
+    truth = scene.pose.rotations
+    prior = truth @ np.swapaxes(exp_so3(wander), -1, -2) @ np.swapaxes(exp_so3(bias), -1, -2)
+    prior[:, 0] = scene.camera.R_lab_cam.T @ prior[:, 0]
+    seen = replace(scene.seen, prior=prior, tracked=np.array([True] * 5 + [False]))
+    seen.prior[5] = np.eye(3)
+    guess = Hypothesis(np.zeros(8, int), scene.camera.R_lab_cam, scene.pose.trans, 0, "", 0)
+    state, _ = start_state(Problem(free_body, seen, scene.landmarks), guess, Weights())
+    state = replace(
+        state, pose=scene.pose, camera=scene.camera, bias=exp_so3(bias)[FREE],
+        placement=replace(state.placement, weights=np.eye(24)[on]),
+    )  # fmt: skip
+    found = trusted(seen, state, believed(Weights()))
+    assert found.bias_deg == pytest.approx(np.sqrt((2 * 8**2 + (10**2 + 20**2) / 3) / 4))
+    assert found.prior_deg == pytest.approx(np.sqrt((2 * 12**2 + (6**2 + 12**2) / 3) / 4))
+    perfect = replace(state, bias=np.tile(np.eye(3), (len(FREE), 1, 1)))
+    sure = replace(believed(Weights()), bias_deg=0.1)
+    assert trusted(seen, perfect, sure).bias_deg == 2.0, "no video is trusted to less than 2 degrees"

@@ -143,3 +143,42 @@ def test_untracked_rows_stay_empty_and_part_the_track() -> None:
     )
     mended, flips = mend_flips(holes)
     assert flips == () and np.isnan(mended.image[lost]).all() and np.isfinite(mended.image[~lost]).all()
+
+
+def gap_in(track: Landmarks, first: int, seconds: float) -> Landmarks:
+    """The rows of ``seconds`` from ``first`` on taken out."""
+    keep = np.ones(len(track.time), dtype=bool)
+    keep[first : first + round(seconds * 30)] = False
+    names = ("image", "world", "visibility", "tracked", "time", "frame")
+    return replace(track, **{name: getattr(track, name)[keep] for name in names})
+
+
+@pytest.mark.parametrize("seconds", [0.3, 0.4, 0.9])
+def test_legs_that_passed_each_other_while_nobody_looked_are_not_flips(seconds: float) -> None:
+    """After a long gap sides start anew: that a leg is where the other was says nothing."""
+    track = walker()
+    stop = round(seconds * 30)
+    first = 60
+    # Each leg stands ahead or behind until the gap, and the other way round after it.
+    swing = np.where(np.arange(len(track.time)) < first + stop / 2, 0.5, -0.5)
+    for name, sign in (("left", 1), ("right", -1)):
+        for joint, reach in (("knee", 0.4), ("ankle", 0.8), ("heel", 0.8), ("foot_index", 0.8)):
+            column = LANDMARKS.index(f"{name}_{joint}")
+            track.world[:, column, 0] = reach * np.sin(sign * swing)
+            track.world[:, column, 2] = 0.0  # nor does the body say which is which
+            track.image[:, column, 0] = 300 * (track.world[:, column, 0] + 1.2 * track.time - 3) + 500
+    assert mend_flips(gap_in(track, first, seconds))[1] == ()
+
+
+def test_sides_go_on_over_a_short_gap() -> None:
+    """What the network calls left after 0.2 s is what was right before, and the body cannot tell."""
+    track = walker()
+    for name in ("left_elbow", "right_elbow"):
+        track.world[:, LANDMARKS.index(name), 2] = 0.0
+    count = 40
+    flipped = np.arange(len(track.time)) >= len(track.time) - count
+    exchanged = exchange(track, {"arms": flipped})
+    seen = gap_in(exchanged, len(track.time) - count - 6, 0.2)
+    mended, flips = mend_flips(seen)
+    assert [(flip.group, flip.start, flip.stop) for flip in flips] == [("arms", len(seen.time) - count, len(seen.time))]
+    np.testing.assert_array_equal(mended.world, gap_in(track, len(track.time) - count - 6, 0.2).world)
