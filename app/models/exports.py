@@ -16,6 +16,7 @@ from app.models.stages import StageBoard
 from solver.errors import InputError
 from solver.io.atomic import cannot_write, make_folder, write_bytes_atomic
 from solver.pipeline.methods import spelt_out
+from solver.pipeline.source import contents
 from solver.pipeline.stage import Event, GraphRun
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def export(
     if not chosen:
         raise InputError("nothing was chosen", "export", "choose at least one format")
     graph = graph_run(board)
-    session = spelt_out(board.document.session, {name: source.digest for name, source in board.sources.items()})
+    session = spelt_out(board.document.session, contents(board.sources))
     files = [name for name in chosen if name != PICTURES.name]
     written = write_formats(folder, session, graph, files, pictures) if files else ()
     if PICTURES.name in chosen:

@@ -14,10 +14,11 @@ import tomli_w
 from solver import __version__
 from solver.errors import InputError
 from solver.io.atomic import make_folder, write_text_atomic
-from solver.pipeline.digest import DigestCache
+from solver.pipeline.digest_cache import DigestCache
 from solver.pipeline.request import Method
 from solver.pipeline.settings import from_table, overlay, to_table
-from solver.pipeline.stage import Source, Stage
+from solver.pipeline.source import Source
+from solver.pipeline.stage import Stage
 from solver.pipeline.store import Store
 
 SCHEMA = 1

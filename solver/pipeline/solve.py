@@ -21,7 +21,8 @@ from solver.pipeline.output import remove_if_empty
 from solver.pipeline.request import Method, SolveOutcome, SolveRequest
 from solver.pipeline.session import InputFile, RunSettings, Session, load_session, save_session, session_folder
 from solver.pipeline.settings import UNSET, overlay, without
-from solver.pipeline.stage import GraphRun, OnEvent, Source, ignore, run_graph, stage_keys
+from solver.pipeline.source import Source, contents
+from solver.pipeline.stage import GraphRun, OnEvent, ignore, run_graph, stage_keys
 from solver.pipeline.stages import SOURCES
 from solver.progress import Progress, part_of, silent
 from solver.solve.results import Candidate
@@ -50,7 +51,7 @@ def solve_session(request: SolveRequest, progress: Progress = silent, on_event: 
     with _tidy(session):
         stages = graph_of(session)
         sources, settings = session.sources(SOURCES), session.stage_settings(stages)
-        session = spelt_out(session, {name: source.digest for name, source in sources.items()})
+        session = spelt_out(session, contents(sources))
         if not session.store.has("landmarks", stage_keys(stages, sources, settings)["landmarks"]):
             _look_at_small_inputs(sources)
         graph = run_graph(

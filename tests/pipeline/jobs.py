@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from solver.errors import InputError
-from solver.pipeline.stage import Event, NoSettings, Source, Stage, run_graph
+from solver.pipeline.source import Source
+from solver.pipeline.stage import Event, NoSettings, Stage, run_graph
 from solver.pipeline.store import Store
 from solver.progress import Found, part_of, tell
 

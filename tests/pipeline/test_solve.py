@@ -20,7 +20,8 @@ from solver.pipeline.request import SolveRequest
 from solver.pipeline.session import load_session, save_session
 from solver.pipeline.settings import from_table
 from solver.pipeline.solve import session_of
-from solver.pipeline.stage import Event, Source, stage_keys
+from solver.pipeline.source import Source
+from solver.pipeline.stage import Event, stage_keys
 from solver.pipeline.stages import GRAPH, SOURCES
 from solver.pipeline.worker import Job
 from solver.progress import silent
