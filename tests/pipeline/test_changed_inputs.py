@@ -122,7 +122,7 @@ def test_a_file_that_was_another_for_a_moment_is_read_again(
     assert reading.go() == str(RIGHT, "ascii") and reading.ran == 2
 
 
-def test_a_long_reading_is_ended_as_soon_as_the_file_is_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_reading_is_ended_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(source_module, "_GLANCE_EVERY_S", 0.0)
     reading = Reading(tmp_path)
     reading.after = lambda: replaced(reading.path, WRONG)
