@@ -16,13 +16,14 @@ from solver.errors import InputError
 from solver.io.atomic import make_folder, write_text_atomic
 from solver.pipeline.digest_cache import DigestCache
 from solver.pipeline.request import Method
+from solver.pipeline.session_file import FILE_NAME as FILE_NAME
+from solver.pipeline.session_file import sealed
 from solver.pipeline.settings import from_table, overlay, to_table
 from solver.pipeline.source import Source
 from solver.pipeline.stage import Stage
 from solver.pipeline.store import Store
 
 SCHEMA = 1
-FILE_NAME = "session.toml"
 SUFFIX = ".markerscope"
 _START_AGAIN = "correct it, or delete it and start again from the markers"
 
@@ -124,7 +125,7 @@ def session_folder(path: str | Path) -> Path | None:
 def save_session(session: Session) -> None:
     """Write ``session.toml``, whole or not at all."""
     folder = make_folder(session.folder)
-    write_text_atomic(folder / FILE_NAME, tomli_w.dumps(session_document(session)))
+    write_text_atomic(folder / FILE_NAME, sealed(tomli_w.dumps(session_document(session))))
 
 
 def session_document(session: Session) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from solver.pipeline.methods import GRAPHS, graph_of, spelt_out, with_method
 from solver.pipeline.output import remove_if_empty
 from solver.pipeline.request import Method, SolveOutcome, SolveRequest
 from solver.pipeline.session import InputFile, RunSettings, Session, load_session, save_session, session_folder
+from solver.pipeline.session_file import FILE_NAME, edited_by_hand, require_state, state_of
 from solver.pipeline.settings import UNSET, overlay, without
 from solver.pipeline.source import Source, contents
 from solver.pipeline.stage import GraphRun, OnEvent, ignore, run_graph, stage_keys
@@ -42,7 +43,16 @@ def solve_session(request: SolveRequest, progress: Progress = silent, on_event: 
     Raises
     ------
     InputError : an input cannot be used; nothing half-written is left
+    EditedOutside : somebody has changed the session file meanwhile; results stay, files are not written
     """
+    loaded, folder = session_folder(request.markers), _folder(request)
+    state = state_of(folder)
+    if folder != loaded and edited_by_hand(folder):
+        raise InputError(
+            "was edited by hand and would be overwritten",
+            folder / FILE_NAME,
+            f"solve that session itself (markerscope solve {folder}), or choose another folder",
+        )
     session = session_of(request)
     if not {"video_file", "prior_file"} & set(session.inputs):
         raise InputError(
@@ -58,6 +68,7 @@ def solve_session(request: SolveRequest, progress: Progress = silent, on_event: 
             stages, sources, settings, session.store, progress=part_of(progress, 0.0, 0.97), on_event=on_event or ignore
         )
         progress(0.97, "writing results")
+        require_state(folder, state, "nothing that was computed is lost; solve again with what it says now")
         write_outputs(session, graph)
         _save(session)
     progress(1.0, "done")
@@ -72,7 +83,7 @@ def session_of(request: SolveRequest) -> Session:
     InputError : a file is not there, or the session cannot be read
     """
     folder = session_folder(request.markers)
-    out = None if request.out is None else Path(os.path.abspath(request.out))
+    out = None if request.out is None else _folder(request)
     if folder is not None:
         session = load_session(folder)
         session = session if out is None else replace(session, folder=out)
@@ -89,6 +100,11 @@ def session_of(request: SolveRequest) -> Session:
         if path is not None:
             session = _with_input(session, f"{name}_file", camera_file(path) if name == "camera" else path)
     return _with_options(session, request)
+
+
+def _folder(request: SolveRequest) -> Path:
+    """Where the session will be."""
+    return Path(os.path.abspath(request.out or session_folder(request.markers) or "."))
 
 
 def _again(out: Path, request: SolveRequest) -> Session:
