@@ -19,6 +19,7 @@ from app.models.keep import kept_decisions
 from app.models.signal import Signal
 from solver.errors import InputError
 from solver.io.atomic import cannot_write, make_folder
+from solver.pipeline.look import look_at
 from solver.pipeline.methods import graph_of, spelt_out
 from solver.pipeline.session import FILE_NAME, SUFFIX, InputFile, Session, load_session, save_session, session_folder
 from solver.pipeline.session_file import require_state, state_of
@@ -121,6 +122,7 @@ class Document:
             raise InputError("a session begins with one", "the marker file", "choose a C3D, TRC, CSV or TSV file")
         session = Session(Path(), files, dict(settings or {}), dict(edits or {}))
         session.stage_settings(graph_of(session))
+        look_at({name: file.path for name, file in files.items()})
         self.close()
         folder = self.home.new_folder(name or files["marker_file"].path.stem)
         self._begin(replace(session, folder=folder), f"Session begun from {files['marker_file'].path.name}")
@@ -168,12 +170,13 @@ class Document:
 
         Raises
         ------
-        InputError : the settings that it makes cannot be used; nothing has changed
+        InputError : the settings or a file that it brings cannot be used; nothing has changed
         """
         before = self.session
         if edit.session == before:
             return
         edit.session.stage_settings(graph_of(edit.session))
+        look_at({name: file.path for name, file in edit.session.inputs.items() if before.inputs.get(name) != file})
         edit = kept_decisions(before, edit)
         self.history.add(Step(edit.sentence, time.time(), edit.session, edit.merge))
         self._after_change()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -16,13 +16,14 @@ from solver.errors import InputError
 from solver.io.camera import camera_file
 from solver.outputs import FILES, SOMETIMES, write_outputs
 from solver.pipeline.doubts import assumptions, doubts
+from solver.pipeline.look import look_at
 from solver.pipeline.methods import GRAPHS, graph_of, spelt_out, with_method
 from solver.pipeline.output import remove_if_empty
 from solver.pipeline.request import Method, SolveOutcome, SolveRequest
 from solver.pipeline.session import InputFile, RunSettings, Session, load_session, save_session, session_folder
 from solver.pipeline.session_file import FILE_NAME, edited_by_hand, require_state, state_of
 from solver.pipeline.settings import UNSET, overlay, without
-from solver.pipeline.source import Source, contents
+from solver.pipeline.source import contents
 from solver.pipeline.stage import GraphRun, OnEvent, ignore, run_graph, stage_keys
 from solver.pipeline.stages import SOURCES
 from solver.progress import Progress, part_of, silent
@@ -63,7 +64,7 @@ def solve_session(request: SolveRequest, progress: Progress = silent, on_event: 
         sources, settings = session.sources(SOURCES), session.stage_settings(stages)
         session = spelt_out(session, contents(sources))
         if not session.store.has("landmarks", stage_keys(stages, sources, settings)["landmarks"]):
-            _look_at_small_inputs(sources)
+            look_at({name: source.value for name, source in sources.items()})  # before the video, which takes long
         graph = run_graph(
             stages, sources, settings, session.store, progress=part_of(progress, 0.0, 0.97), on_event=on_event or ignore
         )
@@ -200,17 +201,6 @@ def _tidy(session: Session) -> Iterator[None]:
             if new_folder:
                 remove_if_empty(session.folder)
         raise
-
-
-def _look_at_small_inputs(sources: Mapping[str, Source]) -> None:
-    """Refuse what cannot be used before the video is watched, which takes long."""
-    from solver.body.model import Body
-    from solver.io.camera import read_camera
-    from solver.io.priors import load_prior
-
-    for name, read in (("camera_file", read_camera), ("body_file", Body.load), ("prior_file", load_prior)):
-        if sources[name].value is not None:
-            read(sources[name].value)
 
 
 def _outcome(session: Session, graph: GraphRun) -> SolveOutcome:

@@ -46,6 +46,16 @@ class Source:
         content = digest(path)
         return Source(Path(path), _together(content, [digest(other) for other in beside(Path(path))]), content)
 
+    def require(self) -> None:
+        """Make sure that a file holds what its digest says.
+
+        Raises
+        ------
+        InputError : it does not
+        """
+        if isinstance(self.value, Path) and Source.file(self.value).digest != self.digest:
+            raise changed(self.value)
+
 
 def beside(path: Path) -> tuple[Path, ...]:
     """Files that are read with a file, by their names: the list of filled positions of a TRC file."""
@@ -116,8 +126,7 @@ class Watch:
 
     def _compare(self) -> None:
         for source in self._sources:
-            if Source.file(source.value).digest != source.digest:
-                raise changed(source.value)
+            source.require()
 
     def _read_stamps(self) -> list[tuple[int, ...] | None]:
         files = [file for source in self._sources for file in (source.value, *beside(source.value))]
