@@ -77,9 +77,13 @@ class Touched(Exception):
     """A file that is being read holds what it did, but may have held something else for a moment."""
 
 
-def changed(path: str | Path) -> InputError:
-    """The one sentence for a file that does not hold what it held when its digest was taken."""
-    return InputError("changed while it was read", path, "leave it as it is until the work has ended, and try again")
+class Changed(InputError):
+    """A file does not hold what it held when its digest was taken."""
+
+
+def changed(path: str | Path) -> Changed:
+    """The one sentence for it."""
+    return Changed("changed while it was read", path, "leave it as it is until the work has ended, and try again")
 
 
 class Watch:
