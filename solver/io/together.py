@@ -35,21 +35,26 @@ def together(folder: str | Path, gone: Sequence[str] = (), staging: Path | None 
     folder = Path(folder)
     new = next((place for place in (*reversed(folder.parents), folder) if not place.exists()), None)
     own = staging or folder / f".tmp-{os.getpid()}-{secrets.token_hex(4)}"
+    inner: list[Path] = []
     try:
-        make_folder(own)
+        make_folder(folder)
+        own.mkdir(parents=True)
         yield own
         # In the order they were written: a folder that holds the last one holds all.
         made = sorted((path for path in own.rglob("*") if path.is_file()), key=lambda path: path.stat().st_mtime_ns)
         moves: list[tuple[Path | None, Path]] = [(path, folder / path.relative_to(own)) for path in made]
         targets = {target for _, target in moves}
         moves += [(None, folder / name) for name in gone if folder / name not in targets]
-        for _, target in moves:
-            make_folder(target.parent)
+        inner = sorted({target.parent for _, target in moves if not target.parent.exists()})
+        for place in inner:
+            make_folder(place)
         move_all(moves, make_folder(own / ".before"))
-    except BaseException:
+    except BaseException as error:
         shutil.rmtree(own, ignore_errors=True)
-        if new is not None:
-            _remove_empty(new)
+        for place in (*inner, *([new] if new is not None else [])):
+            _remove_empty(place)
+        if isinstance(error, OSError) and error.errno is not None:
+            raise cannot_write(folder, error) from error
         raise
     shutil.rmtree(own, ignore_errors=True)
 

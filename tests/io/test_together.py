@@ -77,8 +77,8 @@ def test_a_folder_in_the_place_of_a_file_is_said_and_nothing_else_touched(tmp_pa
     write(tmp_path, a="old")
     (tmp_path / "b").mkdir()
     with pytest.raises(InputError, match="a folder of that name"), together(tmp_path) as place:
-        write(place, a="new", b="new")
-    assert held(tmp_path) == {"a": "old"}
+        write(place, a="new", **{"sub/c": "new", "b": "new"})
+    assert held(tmp_path) == {"a": "old"} and not (tmp_path / "sub").exists()
 
 
 def test_json_has_no_number_that_json_has_not() -> None:

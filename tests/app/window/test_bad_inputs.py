@@ -215,5 +215,7 @@ def test_a_body_that_is_spoilt_later_is_said_once(
     for _ in range(8):
         window.bench.clock.step(1)
         spin()
-    errors = [message for message in window.messages.messages() if message.level == "error"]
-    assert len(errors) <= 1, [message.what for message in errors]
+    assert "body.npz" in only_error(window)
+    assert window.shown.track is None and window.shown.get("markers") is not None
+    window.bench.document.apply(edits.set_input(window.bench.document.session, "body_file", None))
+    spin(lambda: window.shown.track is not None, "the fit on the program's own body")
