@@ -200,3 +200,16 @@ def test_where_the_system_notes_no_change_samples_tell(tmp_path: Path, monkeypat
     known = cache.digest(path)
     path.write_bytes(content[::-1])
     assert cache.digest(path) != known
+
+
+def test_a_small_file_is_read_whole_each_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("solver.pipeline.digest_cache._SETTLED_S", -1.0)
+    monkeypatch.setattr("solver.pipeline.digest_cache.stamp_of", lambda p: (0, 0, Path(p).stat().st_size, 0, 0))
+    path = tmp_path / "prior"
+    content = bytearray(4 << 20)
+    path.write_bytes(content)
+    cache = DigestCache(tmp_path / "cache.json")
+    known = cache.digest(path)
+    content[20_000] = 1  # between two samples
+    path.write_bytes(content)
+    assert cache.digest(path) == file_digest(path) != known
