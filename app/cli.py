@@ -33,6 +33,7 @@ from app.cli_train import train_options
 from solver import __version__
 from solver.bench.request import OUT, names
 from solver.pipeline.request import Convention, Method, Units, Up, parse_range
+from solver.plain import shown
 
 COMMANDS = {
     "demo": "solve the embedded session and say how close it came to the known truth",
@@ -81,7 +82,7 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End with exit code 2."""
-        print(f"{self.prog}: {message}; see {self.prog} --help.", file=sys.stderr)
+        print(shown(f"{self.prog}: {message}; see {self.prog} --help."), file=sys.stderr)
         raise SystemExit(REFUSED)
 
 
@@ -217,7 +218,7 @@ def _open(words: Sequence[str], services: Services) -> int:
     if path is not None and not path.exists():
         names = ", ".join(COMMANDS)
         print(
-            f'markerscope: "{path}" is neither a command nor a file; the commands are {names} ({_HELP}).',
+            f'markerscope: "{shown(str(path))}" is neither a command nor a file; the commands are {names} ({_HELP}).',
             file=sys.stderr,
         )
         return REFUSED

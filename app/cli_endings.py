@@ -9,6 +9,7 @@ import tempfile
 import traceback
 
 from solver.errors import Cancelled, InputError, MarkerscopeError
+from solver.plain import shown
 
 FAILED, REFUSED, CANCELLED = 1, 2, 130
 
@@ -38,7 +39,7 @@ def ended(error: Exception, debug: bool = False) -> int:
 
 
 def _say(sentence: str, code: int) -> int:
-    print(" ".join(sentence.splitlines()), file=sys.stderr)
+    print(shown(" ".join(sentence.splitlines())), file=sys.stderr)
     return code
 
 
@@ -46,7 +47,7 @@ def _write_log(error: Exception) -> str:
     """Keep the traceback for a report; returns where it is."""
     try:
         with tempfile.NamedTemporaryFile(
-            "w", prefix="markerscope-", suffix=".log", delete=False, encoding="utf-8"
+            "w", prefix="markerscope-", suffix=".log", delete=False, encoding="utf-8", errors="backslashreplace"
         ) as log:
             log.write("".join(traceback.format_exception(error)))
     except OSError:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import shutil
 import sys
@@ -13,6 +12,7 @@ from types import TracebackType
 from typing import Any, TextIO
 
 from solver.pipeline.request import Outcome
+from solver.plain import json_text, shown
 from solver.progress import Progress, silent
 
 _REDRAW_EVERY_S = 0.1
@@ -38,9 +38,9 @@ class Terminal:
         self._clear()
         if not self._quiet:
             for line in outcome.lines:
-                print(line)
+                print(shown(line))
             for warning in outcome.warnings:
-                print(f"Warning: {warning}")
+                print(f"Warning: {shown(warning)}")
         if self._json:
             print(json_line(outcome.summary))
         sys.stdout.flush()
@@ -79,7 +79,7 @@ class ProgressBar:
         now = self._clock()
         if now - self._drawn < (_REDRAW_EVERY_S if self._live else _LINE_EVERY_S):
             return
-        self._drawn = now
+        self._drawn, text = now, shown(text)
         if self._live:
             width = shutil.get_terminal_size().columns - 1
             line = self._line(fraction, text, now)[:width]
@@ -111,16 +111,4 @@ class ProgressBar:
 
 def json_line(summary: Mapping[str, Any]) -> str:
     """One line of strict JSON: what is not a finite number becomes null."""
-    return json.dumps(_plain(summary), allow_nan=False)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if hasattr(value, "tolist"):  # numpy's arrays and scalars
-        return _plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value if isinstance(value, bool | int | float | str | None) else str(value)
+    return json_text(summary, indent=None)

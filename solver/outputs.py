@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import secrets
-import shutil
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -17,17 +16,18 @@ import numpy as np
 from solver import __version__
 from solver.angles import world_rotations
 from solver.body.skeleton import BONES, JOINTS, PARENTS
-from solver.errors import InputError
 from solver.filling import filled_by_body
-from solver.io.atomic import cannot_write, make_folder, write_text_atomic
+from solver.io.atomic import write_text_atomic
 from solver.io.camera import FILE_NAME as CAMERA
 from solver.io.camera import write_camera
 from solver.io.export_smpl import write_smpl_npz
+from solver.io.together import together
 from solver.markers import Markers
 from solver.pipeline.cleaning import measured
 from solver.pipeline.digest import canonical, file_digest
 from solver.pipeline.methods import graph_of
 from solver.pipeline.session import Session
+from solver.pipeline.source import changed
 from solver.pipeline.stage import GraphRun
 from solver.report_data import Picture
 from solver.rotations import log_so3
@@ -78,16 +78,13 @@ def write_outputs(session: Session, graph: GraphRun) -> None:
     if known.get("from") == about and _as_written(session.folder, known.get("files")):
         return
     # A name that the store clears away, whatever ends this process.
-    staging = make_folder(session.store.root / "outputs" / f".tmp-{os.getpid()}-{secrets.token_hex(4)}")
-    try:
-        _write(staging, session, graph, about)
-        made = {path.name: file_digest(path) for path in sorted(staging.iterdir())}
+    staging = session.store.root / "outputs" / f".tmp-{os.getpid()}-{secrets.token_hex(4)}"
+    with together(session.folder, (*FILES, *SOMETIMES), staging) as place:
+        _write(place, session, graph, about)
+        made = {path.name: file_digest(path) for path in sorted(place.iterdir())}
         stamp.unlink(missing_ok=True)
-        _move(staging, session.folder, set(made))
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
-        with suppress(OSError):
-            staging.parent.rmdir()
+    with suppress(OSError):
+        staging.parent.rmdir()
     write_text_atomic(stamp, json.dumps({"from": about, "files": made}, indent=1) + "\n")
 
 
@@ -104,27 +101,6 @@ def _as_written(folder: Path, files: Any) -> bool:
     if not isinstance(files, dict) or not set(FILES) <= set(files):
         return False
     return all((folder / name).is_file() and file_digest(folder / name) == digest for name, digest in files.items())
-
-
-def _move(staging: Path, folder: Path, names: set[str]) -> None:
-    """Put finished files in their places, and take away those of an earlier solve that this one has not."""
-    for name in (*FILES, *SOMETIMES):
-        _replace(staging / name if name in names else None, folder / name)
-
-
-def _replace(source: Path | None, target: Path) -> None:
-    """Put a file in another's place, or nothing."""
-    try:
-        if source is None:
-            target.unlink(missing_ok=True)
-        else:
-            os.replace(source, target)
-    except PermissionError as error:
-        raise InputError(
-            "cannot be replaced", target, "close the program that has it open, or choose another folder"
-        ) from error
-    except OSError as error:
-        raise cannot_write(target, error) from error
 
 
 def write_formats(
@@ -145,15 +121,9 @@ def write_formats(
     ------
     InputError : the file system refuses
     """
-    make_folder(folder)
-    staging = make_folder(folder / f".tmp-{os.getpid()}-{secrets.token_hex(4)}")
-    try:
-        _write(staging, session, graph, provenance(session, graph), formats, pictures)
-        names = sorted(path.name for path in staging.iterdir())
-        for name in names:
-            _replace(staging / name, folder / name)
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+    with together(folder) as place:
+        _write(place, session, graph, provenance(session, graph), formats, pictures)
+        names = sorted(path.name for path in place.iterdir())
     return tuple(folder / name for name in names)
 
 
@@ -178,6 +148,8 @@ def _write(
     markers, motion, angles = measured(graph["clean"]), graph["fit"], graph["angles"]
     body_file = session.inputs.get("body_file")
     body = with_bone_lengths(Body.load(body_file.path if body_file else None))
+    if body_file is not None and body_file.digest and file_digest(body_file.path) != body_file.digest:
+        raise changed(body_file.path)
     named = labelled(markers, motion)
     if "angles" in formats or "angles_long" in formats:  # the long form, too, has its convention beside it
         write_angles(folder, angles, about, evidence(angles.convention, motion.marker_joint))

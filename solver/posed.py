@@ -9,6 +9,7 @@ import numpy as np
 
 from solver import metrics
 from solver.body.model import Body
+from solver.errors import InputError
 from solver.io.motion_in import MOTION, MotionFile, read_motion
 from solver.markers import Markers
 
@@ -68,13 +69,21 @@ def imported_result(
 
 
 def body_of(path: str | Path) -> Path | None:
-    """The user's body that a result was solved with; None is the embedded one."""
+    """The user's body that a result was solved with; None is the embedded one.
+
+    Raises
+    ------
+    InputError : the file holds another body now
+    """
+    from solver.pipeline.digest import file_digest
     from solver.pipeline.session import load_session, session_folder
 
     folder = session_folder(Path(path).parent if Path(path).name == MOTION else path)
     if folder is None:
         return None
     file = load_session(folder).inputs.get("body_file")
+    if file is not None and file.digest and file_digest(file.path) != file.digest:
+        raise InputError("is not the body any more that the result was solved with", file.path, "solve again")
     return None if file is None else Path(file.path)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 Progress = Callable[[float, str], None]
 """Called with the fraction done, 0..1, and what is being done. It may raise ``Cancelled``."""
@@ -40,6 +40,21 @@ def tell(progress: Progress, found: Found) -> None:
         listener(found)
 
 
+class Pieces(Protocol):
+    """Where pieces of an unfinished result are kept, so that work which is stopped can go on from them."""
+
+    def get(self, name: str, declared: Any) -> Any | None:
+        """A piece of the declared type; None where it is not there."""
+
+    def keep(self, name: str, value: Any) -> None:
+        """Keep a piece."""
+
+
+def pieces_of(progress: Progress) -> Pieces | None:
+    """Where who runs the stages keeps pieces of this one's result; None where nobody does."""
+    return getattr(progress, "pieces", None)
+
+
 def part_of(progress: Progress, start: float, stop: float) -> Progress:
     """A reporter for a sub-task that fills ``start..stop`` of ``progress``; what is found on the way is passed on."""
     return _Part(progress, start, stop)
@@ -56,3 +71,7 @@ class _Part:
 
     def found(self, found: Found) -> None:
         tell(self.whole, found)
+
+    @property
+    def pieces(self) -> Pieces | None:
+        return pieces_of(self.whole)

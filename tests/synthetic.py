@@ -17,7 +17,8 @@ from solver.pipeline.inputs import LandmarkSettings
 from solver.pipeline.request import SolveRequest
 from solver.pipeline.session import Session, save_session
 from solver.pipeline.solve import session_of
-from solver.pipeline.stage import Source, stage_keys
+from solver.pipeline.source import Source
+from solver.pipeline.stage import stage_keys
 from solver.pipeline.stages import GRAPH, SOURCES
 from solver.rotations import exp_so3, log_so3
 from solver.solve.kinematics import forward, place_points

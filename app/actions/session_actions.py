@@ -8,6 +8,7 @@ from app.actions.action import Action, Asks, first, needs_idle, needs_session
 from app.cli_commands import DEMO_MARKERS, DEMO_VIDEO
 from app.models import edits, exports
 from app.models.workbench import Said, Workbench
+from solver.pipeline.session_file import EditedOutside
 
 
 def may_close(bench: Workbench, asks: Asks) -> bool:
@@ -60,8 +61,24 @@ def _save(bench: Workbench, asks: Asks) -> bool:
     bench.remember()
     if bench.document.untitled:
         return _save_as(bench, asks)
-    bench.document.save()
+    try:
+        bench.document.save()
+    except EditedOutside as error:
+        return _settle(bench, asks, error)
     return True
+
+
+def _settle(bench: Workbench, asks: Asks, error: EditedOutside) -> bool:
+    """Two have changed the session: the user says whose it is to be. Neither is overwritten."""
+    ways = ("Keep mine in another folder...", "Take the one on disk (can be undone)")
+    chosen = asks.choice("The session file was edited outside. Neither is lost", ways)
+    if chosen == 0 and not (reason := needs_idle(bench)):
+        return _save_as(bench, asks)
+    if chosen == 1:
+        bench.document.take_from_disk()
+        return True
+    bench.say(Said("error", error.what, error.where or "", reason if chosen == 0 else error.remedy))
+    return False
 
 
 def _save_as(bench: Workbench, asks: Asks) -> bool:

@@ -19,8 +19,10 @@ from app.models.keep import kept_decisions
 from app.models.signal import Signal
 from solver.errors import InputError
 from solver.io.atomic import cannot_write, make_folder
+from solver.pipeline.look import look_at
 from solver.pipeline.methods import graph_of, spelt_out
 from solver.pipeline.session import FILE_NAME, SUFFIX, InputFile, Session, load_session, save_session, session_folder
+from solver.pipeline.session_file import require_state, state_of
 
 
 class Document:
@@ -46,6 +48,7 @@ class Document:
         self.recovered = False
         self._history: History | None = None
         self._on_disk: Session | None = None
+        self._state = ""
         self._writer = Writer()
 
     @property
@@ -119,6 +122,7 @@ class Document:
             raise InputError("a session begins with one", "the marker file", "choose a C3D, TRC, CSV or TSV file")
         session = Session(Path(), files, dict(settings or {}), dict(edits or {}))
         session.stage_settings(graph_of(session))
+        look_at({name: file.path for name, file in files.items()})
         self.close()
         folder = self.home.new_folder(name or files["marker_file"].path.stem)
         self._begin(replace(session, folder=folder), f"Session begun from {files['marker_file'].path.name}")
@@ -138,6 +142,7 @@ class Document:
         if folder is None and Path(path).is_dir() and read_journal(Path(path).absolute()) is not None:
             folder = Path(path).absolute()  # never saved, and left by a crash
         left = None if folder is None else read_journal(folder)
+        state = "" if folder is None else state_of(folder)
         if left is not None and left.alive and not although_open:
             raise InputError("is open in another window", path, "close it there first")
         on_disk = load_session(path) if left is None or session_folder(path) is not None else None
@@ -147,9 +152,10 @@ class Document:
         self.close()
         if left is None:
             assert on_disk is not None
-            self._begin(on_disk, "Session opened", on_disk)
+            self._begin(on_disk, "Session opened", on_disk, state=state)
         else:
-            self._begin(left.history.session, "", on_disk, left.history)
+            ours = left.state is None or any(step.session == on_disk for step in left.history.steps)
+            self._begin(left.history.session, "", on_disk, left.history, state if ours else left.state or "")
         if not self.untitled:
             self.home.add_recent(self.folder)
             self.saved.emit()
@@ -164,12 +170,13 @@ class Document:
 
         Raises
         ------
-        InputError : the settings that it makes cannot be used; nothing has changed
+        InputError : the settings or a file that it brings cannot be used; nothing has changed
         """
         before = self.session
         if edit.session == before:
             return
         edit.session.stage_settings(graph_of(edit.session))
+        look_at({name: file.path for name, file in edit.session.inputs.items() if before.inputs.get(name) != file})
         edit = kept_decisions(before, edit)
         self.history.add(Step(edit.sentence, time.time(), edit.session, edit.merge))
         self._after_change()
@@ -193,15 +200,30 @@ class Document:
         Raises
         ------
         InputError : the file system refuses, or the session needs ``save_as`` first
+        EditedOutside : somebody else has changed the file since it was read; it stays as it is
         """
         if self.untitled:
             raise InputError("it has no place yet", "the session", "choose a folder for it")
+        self._require_state()
         session = spelt_out(self.session, digests_of(self.session))
         save_session(session)
         self.history.restate(session)
-        self._on_disk = session
+        self._on_disk, self._state = session, state_of(self.folder)
         self._keep()
         self.home.add_recent(self.folder)
+        self.saved.emit()
+
+    def take_from_disk(self) -> None:
+        """Have the session as its file says now, as a decision that can be undone; the file then counts as read.
+
+        Raises
+        ------
+        InputError : the file cannot be read, or its settings cannot be used; nothing has changed
+        """
+        state, on_disk = state_of(self.folder), load_session(self.folder)
+        self.apply(Edit(f"As {FILE_NAME} says, edited outside", on_disk, complete=True))
+        self._on_disk, self._state = on_disk, state
+        self._keep()
         self.saved.emit()
 
     def save_as(self, folder: Path) -> None:
@@ -219,8 +241,11 @@ class Document:
             if folder.is_dir() and session_folder(folder) is None and any(folder.iterdir()):
                 raise InputError("is a folder of other things", folder, "choose another name")
             _copy_results(old, folder)
+        else:
+            self._require_state()
         moved = [replace(step, session=replace(step.session, folder=folder)) for step in self.history.steps]
         save_session(moved[self.history.position].session)
+        self._state = state_of(folder)
         self._writer.write(old / JOURNAL, None)
         self._writer.flush()
         self._history = History(moved, self.history.position)
@@ -252,14 +277,20 @@ class Document:
         if untitled and not keep_untitled:
             shutil.rmtree(folder, ignore_errors=True)
         self._history, self._on_disk, self.view, self.recovered = None, None, {}, False
+        self._state = ""
         self.changed.emit(True)
         self.saved.emit()
 
     def _begin(
-        self, session: Session, sentence: str, on_disk: Session | None = None, history: History | None = None
+        self,
+        session: Session,
+        sentence: str,
+        on_disk: Session | None = None,
+        history: History | None = None,
+        state: str = "",
     ) -> None:
         self._history = history or History([Step(sentence, time.time(), session)])
-        self._on_disk = on_disk
+        self._on_disk, self._state = on_disk, state
         self.recovered = history is not None and session != on_disk
         self.view = read_view(session.folder)
         self._keep()
@@ -272,7 +303,10 @@ class Document:
         self.saved.emit()
 
     def _keep(self) -> None:
-        self._writer.write(self.folder / JOURNAL, journal_of(self.history))
+        self._writer.write(self.folder / JOURNAL, journal_of(self.history, self._state))
+
+    def _require_state(self) -> None:
+        require_state(self.folder, self._state, "save yours in another folder, or take the one on disk")
 
 
 def digests_of(session: Session) -> dict[str, str]:

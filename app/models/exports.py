@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +12,10 @@ import numpy as np
 from app.models.fields import title
 from app.models.stages import StageBoard
 from solver.errors import InputError
-from solver.io.atomic import cannot_write, make_folder, write_bytes_atomic
+from solver.io.atomic import make_folder, write_bytes_atomic
+from solver.io.together import together
 from solver.pipeline.methods import spelt_out
+from solver.pipeline.source import contents
 from solver.pipeline.stage import Event, GraphRun
 
 if TYPE_CHECKING:
@@ -90,12 +90,14 @@ def export(
     if not chosen:
         raise InputError("nothing was chosen", "export", "choose at least one format")
     graph = graph_run(board)
-    session = spelt_out(board.document.session, {name: source.digest for name, source in board.sources.items()})
+    session = spelt_out(board.document.session, contents(board.sources))
     files = [name for name in chosen if name != PICTURES.name]
-    written = write_formats(folder, session, graph, files, pictures) if files else ()
-    if PICTURES.name in chosen:
-        written = (*written, *write_pictures(folder / PICTURES.files[0], pictures))
-    return written
+    with together(folder) as place:
+        written = write_formats(place, session, graph, files, pictures) if files else ()
+        if PICTURES.name in chosen:
+            written = (*written, *write_pictures(place / PICTURES.files[0], pictures))
+        names = [path.relative_to(place) for path in written]
+    return tuple(folder / name for name in names)
 
 
 def export_angles(board: StageBoard, path: Path) -> tuple[Path, ...]:
@@ -108,14 +110,10 @@ def export_angles(board: StageBoard, path: Path) -> tuple[Path, ...]:
     path = path if path.suffix else path.with_suffix(".csv")
     if path.suffix.lower() != ".csv":
         raise InputError("is no name for a table", path, "choose one that ends in .csv")
-    folder = make_folder(path.parent)
-    try:
-        with tempfile.TemporaryDirectory(prefix=".tmp-", dir=folder) as staging:
-            table, about = export(board, Path(staging), ["angles"])
-            os.replace(about, path.with_suffix(".json"))
-            os.replace(table, path)
-    except OSError as error:
-        raise cannot_write(path, error) from error
+    with together(path.parent) as place:
+        table, about = export(board, place, ["angles"])
+        about.rename(place / path.with_suffix(".json").name)
+        table.rename(place / path.name)
     return path, path.with_suffix(".json")
 
 

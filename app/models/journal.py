@@ -37,11 +37,13 @@ class Left:
     Attributes
     ----------
     history : as it was
+    state : of the session file when it was read or written last, None where an older version kept the journal
     alive : whether the program that wrote it still runs
     """
 
     history: History
     alive: bool
+    state: str | None = None
 
 
 def read_journal(folder: Path) -> Left | None:
@@ -56,18 +58,20 @@ def read_journal(folder: Path) -> Left | None:
         position = int(content["position"])
         if not 0 <= position < len(steps):
             return None
-        return Left(History(steps, position), _alive(content))
+        state = content.get("state")
+        return Left(History(steps, position), _alive(content), state if isinstance(state, str) else None)
     except (OSError, ValueError, KeyError, TypeError, AttributeError, InputError):
         return None
 
 
-def journal_of(history: History) -> dict[str, Any]:
-    """What is written down of a history."""
+def journal_of(history: History, state: str) -> dict[str, Any]:
+    """What is written down of a history, and of the session file's ``state`` that it stands on."""
     first = max(0, min(history.position, len(history.steps) - _KEPT))
     steps = history.steps[first : first + _KEPT]
     return {
         "process": os.getpid(),
         "computer": socket.gethostname(),
+        "state": state,
         "position": history.position - first,
         "steps": [
             {"sentence": step.sentence, "when": step.when, "session": session_document(step.session)} for step in steps

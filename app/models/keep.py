@@ -14,7 +14,8 @@ from typing import Any
 from app.models.edits import Edit
 from solver.pipeline.methods import graph_of
 from solver.pipeline.session import Session
-from solver.pipeline.stage import Source, stage_keys
+from solver.pipeline.source import Source
+from solver.pipeline.stage import stage_keys
 from solver.pipeline.stages import SOURCES
 
 _BY_COLUMN = ("merges", "splits", "moves", "left_out")

@@ -13,7 +13,8 @@ from solver.errors import InputError
 from solver.pipeline.methods import GRAPHS
 from solver.pipeline.session import Session
 from solver.pipeline.settings import UNSET, from_table
-from solver.pipeline.stage import Source, Stage, stage_keys
+from solver.pipeline.source import Source
+from solver.pipeline.stage import Stage, stage_keys
 
 _MOST_SAID = 3
 

@@ -18,7 +18,8 @@ from app.models.signal import Signal
 from solver.errors import InputError
 from solver.pipeline.methods import graph_of
 from solver.pipeline.session import Session
-from solver.pipeline.stage import Source, Stage, State, stage_keys
+from solver.pipeline.source import Source
+from solver.pipeline.stage import Stage, State, stage_keys
 from solver.pipeline.stages import SOURCES
 from solver.pipeline.store import Entry, Store
 

@@ -88,7 +88,9 @@ class WindowAsks:
         box = QMessageBox(self.window)
         box.setIcon(QMessageBox.Icon.Question)
         box.setText("Stages are running. Stop them?")
-        box.setInformativeText("What was finished stays; the stage at work begins anew the next time.")
+        box.setInformativeText(
+            "What was finished stays. The stage at work begins anew the next time; watching the video goes on."
+        )
         stop = box.addButton("Stop and close", QMessageBox.ButtonRole.DestructiveRole)
         box.setDefaultButton(box.addButton("Go on running", QMessageBox.ButtonRole.RejectRole))
         box.exec()

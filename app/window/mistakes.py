@@ -19,6 +19,7 @@ class Mistakes:
     def __init__(self, bench: Workbench) -> None:
         self.bench = bench
         self._told = ""
+        bench.document.changed.connect(self._forget)
 
     def watch(self) -> None:
         """From now on, and whatever is painted."""
@@ -34,10 +35,16 @@ class Mistakes:
         else:
             self._before(kind, error, trace)
 
+    def _forget(self, another: bool) -> None:
+        """What was decided may have mended it."""
+        self._told = ""
+
     def tell(self, error: Exception) -> None:
         """Say it."""
         if isinstance(error, MarkerscopeError):
-            self.bench.say_error(error)
+            if str(error) != self._told:  # else every frame that is drawn would say that a file cannot be read
+                self._told = str(error)
+                self.bench.say_error(error)
             return
         where = traceback.extract_tb(error.__traceback__)
         said = f"A mistake in the program ({type(error).__name__}): {str(error).rsplit('(): ', 1)[-1]}"

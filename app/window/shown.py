@@ -25,6 +25,9 @@ WANTED = (
 )  # fmt: skip
 
 
+_ON_THE_BODY = ("localize", "solve", "orient", "fit")
+
+
 class Shown:
     """The latest result of every stage, stale or not, as soon as it is in memory.
 
@@ -42,6 +45,7 @@ class Shown:
         self._made: dict[str, tuple[Any, Any]] = {}
         self._bodies: dict[Path | None, Body] = {}
         self._coming: threading.Thread | None = None
+        self._spoilt: tuple[Path, str] | None = None
         self._posed: tuple[FittedMotion, BodyTrack] | None = None
         bench.board.prepare = self._prepare
         bench.board.changed.connect(self.follow)
@@ -95,7 +99,21 @@ class Shown:
     def get(self, stage: str) -> Any:
         """A stage's latest result, None where there is none (yet), or only one of other markers than there are now."""
         value = self._values.get(stage)
-        return value if value is not None and self._of_these_markers(stage, value) else None
+        if value is None or not self._of_these_markers(stage, value):
+            return None
+        return value if stage not in _ON_THE_BODY or self._has_body() else None
+
+    def _has_body(self) -> bool:
+        """Whether the body can be read; where it cannot, that is said once, and nothing that stands on it is drawn."""
+        path = self._body_file() if self.bench.document.is_open else None
+        if path is None or path in self._bodies:
+            return True
+        source = self.bench.board.sources.get("body_file")
+        own = path, "" if source is None else source.digest
+        if own != self._spoilt:
+            self._spoilt = own
+            return self.bench.attempt(lambda: self.body)
+        return False
 
     def _of_these_markers(self, stage: str, value: Any) -> bool:
         """Whether a result speaks of no marker, and no keyframe, that is not there: the file may have changed."""

@@ -19,11 +19,12 @@ from solver.bench.machine import machine
 from solver.bench.motions import MotionSource, find_motions
 from solver.bench.registry import method_named, with_ablations
 from solver.bench.request import BenchRequest
-from solver.bench.runner import plain, run_all
+from solver.bench.runner import run_all, write_tables
 from solver.bench.table import bins_of, markdown_of, rows_of
 from solver.io.atomic import make_folder, write_text_atomic
 from solver.parallel import cores
 from solver.pipeline.request import Outcome
+from solver.plain import json_text
 from solver.progress import Progress, part_of, silent
 
 _METHODS = ("bundle",)
@@ -59,8 +60,7 @@ def run_bench(request: BenchRequest, progress: Progress = silent) -> Outcome:
         "runs": [record["key"] for record in records],
     }
     text = f"{_said(header, cases, methods)}\n{table}{descents_of(records)}{_failures(records)}"
-    write_text_atomic(request.out / "bench.md", text)
-    write_text_atomic(request.out / "bench.json", json.dumps(plain(summary), indent=1) + "\n")
+    write_tables(request.out, {"bench.md": text, "bench.json": json_text(summary) + "\n"})
     progress(1.0, "done")
     counts = {status: sum(r["status"] == status for r in records) for status in ("done", "failed", "timed out")}
     last = f"{len(records)} runs, {computed} of them computed now; tables and records are in {request.out}."

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import json
 import time
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -13,17 +12,18 @@ from typing import Any
 import numpy as np
 
 from solver import __version__
-from solver.bench.clean_tables import CleanTables, FillRow, OutlierRow, plain
+from solver.bench.clean_tables import CleanTables, FillRow, OutlierRow
 from solver.bench.machine import machine
 from solver.bench.request import BenchRequest
+from solver.bench.runner import write_tables
 from solver.clean.fill import METHODS, fill
 from solver.clean.gap_model import GapModel, draw_gaps, draw_shifts, heavy_tailed, read_gap_statistics
 from solver.clean.gaps import Filled, FillSettings
 from solver.clean.outliers import OutlierSettings, find_outliers
 from solver.clean.request import Method, OutlierMethod
 from solver.errors import InputError
-from solver.io.atomic import make_folder, write_text_atomic
 from solver.pipeline.request import Outcome
+from solver.plain import json_text
 from solver.progress import Progress, silent
 
 RATE = 60.0
@@ -73,9 +73,7 @@ def run_clean_bench(
             outliers += _outliers(name, resampled(positions, rate, hz), hz, seeds)
     tables = CleanTables(tuple(fills), tuple(outliers), left_out)
     if out is not None:
-        make_folder(out)
-        write_text_atomic(out / "clean.md", tables.markdown())
-        write_text_atomic(out / "clean.json", json.dumps(plain(asdict(tables)), indent=1) + "\n")
+        write_tables(out, {"clean.md": tables.markdown(), "clean.json": json_text(asdict(tables)) + "\n"})
     progress(1.0, "done")
     return tables
 
@@ -99,8 +97,7 @@ def clean_suite(request: BenchRequest, progress: Progress = silent) -> Outcome:
         "seeds": request.seeds,
     }
     short = _said(header) + tables.markdown(_SHORT, _SHORT)
-    write_text_atomic(request.out / "bench.md", short)
-    write_text_atomic(request.out / "bench.json", json.dumps(header | plain(asdict(tables)), indent=1) + "\n")
+    write_tables(request.out, {"bench.md": short, "bench.json": json_text(header | asdict(tables)) + "\n"})
     lines = (*tables.markdown().splitlines(), f"Tables are in {request.out}; bench.md has those of the defaults.")
     return Outcome(summary={"suite": "clean", "out": str(request.out), **asdict(tables)}, lines=lines)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 
@@ -113,12 +112,3 @@ def _means(rows: Sequence[FillRow]) -> list[FillRow]:
         frames, markers = sum(row["frames"] for row in alike), round(np.mean([row["markers"] for row in alike]))
         means.append(FillRow(f"mean of {len(alike)}", frames, markers, method, **figures))
     return means
-
-
-def plain(value: Any) -> Any:
-    """JSON has no NaN."""
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

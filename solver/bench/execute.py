@@ -20,6 +20,7 @@ from solver.bench.methods import Given, Labels, Variant
 from solver.bench.motions import MotionSource, find_motions, read_source
 from solver.bench.registry import method_named
 from solver.errors import MarkerscopeError
+from solver.pipeline.source import Changed
 from solver.progress import Progress
 from solver.synth.session import SynthSession, SynthSettings, synthesise
 
@@ -82,6 +83,8 @@ def execute(run: Run) -> dict[str, Any]:
         return record | {"status": "done"} | _measured(run)
     except OutOfTime:
         return record | {"status": "timed out", "sentence": f"It took more than {run.limit:g} s."}
+    except Changed:  # says nothing of the method, and must not be kept as if it did
+        raise
     except MarkerscopeError as error:
         return record | {"status": "failed", "sentence": str(error)}
     except Exception as error:  # a method may fail in any way; it is counted

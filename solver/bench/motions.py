@@ -13,6 +13,7 @@ import numpy as np
 from solver.errors import InputError
 from solver.io.motion import SkeletonMotion
 from solver.pipeline.digest import digest_of, file_digest
+from solver.pipeline.source import changed
 from solver.synth.acts import ACTS
 
 T = TypeVar("T")
@@ -61,8 +62,11 @@ def _spread(items: Sequence[T], most: int) -> list[T]:
 
 def _source(path: Path) -> MotionSource:
     skeleton = _skeleton_of(path) if path.suffix.lower() == ".amc" else None
-    files = [file for file in (path, skeleton) if file is not None]
-    return MotionSource(path.stem, digest_of([file_digest(file) for file in files]), path, skeleton)
+    return MotionSource(path.stem, _digest(path, skeleton), path, skeleton)
+
+
+def _digest(path: Path, skeleton: Path | None) -> str:
+    return digest_of([file_digest(file) for file in (path, skeleton) if file is not None])
 
 
 def _skeleton_of(amc: Path) -> Path | None:
@@ -74,13 +78,25 @@ def _skeleton_of(amc: Path) -> Path | None:
 
 @lru_cache(maxsize=4)
 def read_source(source: MotionSource) -> SkeletonMotion | str:
-    """The movement itself, or the name of one that the generator knows."""
+    """The movement itself, or the name of one that the generator knows.
+
+    Raises
+    ------
+    Changed : the file holds another movement than when it was found, so that its record would be under a wrong key
+    """
     if source.path is None:
         return source.name
-    if source.skeleton is not None:
+    motion = _read(source.path, source.skeleton)
+    if _digest(source.path, source.skeleton) != source.digest:
+        raise changed(source.path)
+    return motion
+
+
+def _read(path: Path, skeleton: Path | None) -> SkeletonMotion:
+    if skeleton is not None:
         from solver.io.asf_amc import read_asf_amc
 
-        return read_asf_amc(source.skeleton, source.path)
+        return read_asf_amc(skeleton, path)
     from solver.io.bvh import read_bvh
 
-    return read_bvh(source.path)
+    return read_bvh(path)

@@ -15,12 +15,14 @@ from solver import __version__
 from solver.bench.machine import machine
 from solver.bench.neural_exam import Recording, examined, recordings
 from solver.bench.request import BenchRequest
+from solver.bench.runner import write_tables
 from solver.body.model import Body
 from solver.errors import InputError
 from solver.io.atomic import make_folder, write_text_atomic
 from solver.neural.library import KINDS, Clip, by_kind, load_library
 from solver.pipeline.digest import digest_of, file_digest
 from solver.pipeline.request import Outcome
+from solver.plain import json_text
 from solver.progress import Progress, part_of, silent
 
 MINUTES = 8.0
@@ -203,8 +205,7 @@ def _write(request: BenchRequest, ground: Ground, minutes: float, rows: Sequence
     }
     text = _said(header) + table_of(rows)
     summary = {**header, "rows": [asdict(row) for row in rows]}
-    write_text_atomic(request.out / "bench.md", text)
-    write_text_atomic(request.out / "bench.json", json.dumps(summary, indent=1) + "\n")
+    write_tables(request.out, {"bench.md": text, "bench.json": json_text(summary) + "\n"})
     return {**summary, "out": str(request.out)}, text
 
 

@@ -6,7 +6,7 @@ import json
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -15,6 +15,8 @@ from typing import Any
 
 from solver.bench.execute import Run, execute
 from solver.io.atomic import make_folder, write_text_atomic
+from solver.io.together import together
+from solver.plain import json_text
 from solver.progress import Progress, silent
 
 _THREADS = (
@@ -45,7 +47,7 @@ def run_all(
     waiting = {run.key: run for run in runs if record_of(folder, run) is None}
     total = len(waiting)
     for done, record in enumerate(_computed(list(waiting.values()), workers, work), 1):
-        write_text_atomic(record_path(folder, record["key"]), json.dumps(plain(record), indent=1) + "\n")
+        write_text_atomic(record_path(folder, record["key"]), json_text(record) + "\n")
         what = f"{record['case']}, {record['method']}, {record['motion']}, seed {record['seed']}"
         progress(done / total, f"run {done} of {total}: {what}: {_said(record)}")
     records = (record_of(folder, run) for run in runs)
@@ -70,17 +72,11 @@ def record_of(folder: Path, run: Run) -> dict[str, Any] | None:
     return record | {"case": run.case.name, "motion": run.motion.name}
 
 
-def plain(value: Any) -> Any:
-    """JSON values; a number that is not finite becomes null."""
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if hasattr(value, "tolist"):
-        return plain(value.tolist())
-    if isinstance(value, float):
-        return value if abs(value) < float("inf") else None
-    return value if isinstance(value, bool | int | str | None) else str(value)
+def write_tables(folder: Path, texts: Mapping[str, str]) -> None:
+    """Write the texts of a benchmark by file name, all or none."""
+    with together(folder) as place:
+        for name, text in texts.items():
+            write_text_atomic(place / name, text)
 
 
 def _said(record: dict[str, Any]) -> str:

@@ -30,7 +30,7 @@ def changes_of(cleaned: Cleaned) -> dict[str, Any]:
         ],
         "fills": [
             _row(cleaned, Gap(fill.marker, fill.first, fill.last))
-            | {"method": fill.method, "confidence": round(fill.confidence, 4), "expected_error_m": round(fill.error, 6)}
+            | {"method": fill.method, "confidence": round(fill.confidence, 4), "expected_error_m": _known(fill.error)}
             for fill in cleaned.fills
         ],
         "left": [_row(cleaned, gap) for gap in find_gaps(markers.present)],
@@ -64,7 +64,7 @@ def lines_of(changes: dict[str, Any]) -> tuple[str, ...]:
             row["what"],
             row.get("method", ""),
             f"{row['confidence']:.2f}" if "confidence" in row else "",
-            f"{1000 * row['expected_error_m']:.1f}" if "expected_error_m" in row else "",
+            _in_mm(row["expected_error_m"]) if "expected_error_m" in row else "",
         )
         for row in _by_marker(changes)
     ]
@@ -109,6 +109,15 @@ def aligned(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
     """Rows as lines, columns under each other."""
     widths = [max(map(len, column)) for column in zip(*rows)]
     return tuple("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows)
+
+
+def _known(error: float) -> float | None:
+    """An expected error, m; None where the method has none for such a gap."""
+    return round(float(error), 6) if np.isfinite(error) else None
+
+
+def _in_mm(error: float | None) -> str:
+    return "not known" if error is None else f"{1000 * error:.1f}"
 
 
 def _row(cleaned: Cleaned, span: Gap) -> dict[str, Any]:

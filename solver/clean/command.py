@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 from solver import __version__
 from solver.clean.changes import changes_of, csv_of, lines_of
@@ -15,8 +16,12 @@ from solver.clean.request import CleanRequest
 from solver.clean.swaps import apply_proposals
 from solver.errors import InputError
 from solver.io.atomic import write_text_atomic
+from solver.io.filled_list import filled_list_path
+from solver.io.together import together
 from solver.markers import Markers
 from solver.pipeline.request import Outcome
+from solver.pipeline.source import Source
+from solver.plain import json_text
 from solver.progress import Progress, part_of, silent
 
 
@@ -28,7 +33,6 @@ def clean_file(request: CleanRequest, progress: Progress = silent) -> Outcome:
     InputError : the file cannot be read or written, or an edit is to be made that was not proposed
     """
     from solver.io import load_markers
-    from solver.pipeline.digest import file_digest
     from solver.pipeline.output import check_output_folder
 
     if not request.markers.exists():
@@ -37,6 +41,7 @@ def clean_file(request: CleanRequest, progress: Progress = silent) -> Outcome:
         raise InputError("would be overwritten", request.out, "choose another name for the cleaned file")
     check_output_folder(request.out.parent)
     progress(0.0, "reading")
+    watch = _watched(request)
     markers = load_markers(
         request.markers,
         up=request.up,
@@ -46,24 +51,19 @@ def clean_file(request: CleanRequest, progress: Progress = silent) -> Outcome:
     ).between(*(request.range or (None, None)))
     settings = settings_of(request)
     fill_by = None if request.weights is None else fill_by_weights(request.weights, markers)
+    about = _about(request, settings, watch)
     made: list[str] = []
     if request.apply:
         markers, made = _edited(markers, settings, request.apply)
     cleaned = clean(markers, settings, part_of(progress, 0.1, 0.9), fill_by)
     progress(0.9, "writing")
-    write_markers(request.out, cleaned.markers)
     changes = changes_of(cleaned) | {"edits_made": made}
-    about = {
-        "program": f"markerscope {__version__}",
-        "input": {"file": request.markers.name, "sha256": file_digest(request.markers)},
-        "settings": _finite(asdict(settings)),
-    }
-    if request.weights is not None:
-        about["weights"] = {"file": request.weights.name, "sha256": file_digest(request.weights)}
-    listed = request.out.with_suffix(".changes.json")
-    write_text_atomic(listed, json.dumps(about | changes, indent=1, allow_nan=False) + "\n")
-    table = request.out.with_suffix(".changes.csv")
-    write_text_atomic(table, csv_of(changes))
+    listed, table = request.out.with_suffix(".changes.json"), request.out.with_suffix(".changes.csv")
+    old = (filled_list_path(request.out).name,) if request.out.suffix.lower() == ".trc" else ()
+    with together(request.out.parent, gone=old) as folder:
+        write_markers(folder / request.out.name, cleaned.markers)
+        write_text_atomic(folder / listed.name, json_text(about | changes) + "\n")
+        write_text_atomic(folder / table.name, csv_of(changes))
     lines = (
         *markers.notes,
         *(f"Edit made: {sentence}" for sentence in made),
@@ -71,6 +71,25 @@ def clean_file(request: CleanRequest, progress: Progress = silent) -> Outcome:
         f"Written to {request.out}; every change is in {listed.name} and {table.name} beside it.",
     )
     return Outcome(summary={"out": str(request.out), **_totals(cleaned), **changes}, lines=lines)
+
+
+def _watched(request: CleanRequest) -> dict[str, Source]:
+    """The files that are read, as they are before."""
+    given = {"input": request.markers, "weights": request.weights}
+    return {name: Source.file(path) for name, path in given.items() if path is not None}
+
+
+def _about(request: CleanRequest, settings: CleanSettings, read: Mapping[str, Source]) -> dict[str, Any]:
+    """What is cleaned from what, once all is read.
+
+    Raises
+    ------
+    InputError : a file has changed meanwhile
+    """
+    for source in read.values():
+        source.require()
+    files = {name: {"file": source.value.name, "sha256": source.content} for name, source in read.items()}
+    return {"program": f"markerscope {__version__}", **files, "settings": asdict(settings)}
 
 
 def settings_of(request: CleanRequest) -> CleanSettings:
@@ -123,9 +142,3 @@ def _totals(cleaned: Cleaned) -> dict[str, object]:
         "samples_filled": sum(fill.length for fill in cleaned.fills),
         "samples_lost": int((~markers.present).sum()),
     }
-
-
-def _finite(value: object) -> object:
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value

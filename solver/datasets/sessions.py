@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,8 +25,10 @@ from solver.errors import InputError
 from solver.io.atomic import make_folder, write_text_atomic
 from solver.io.export_c3d import write_c3d
 from solver.io.markers_in import load_markers
+from solver.io.together import together
 from solver.markers import Markers
 from solver.pipeline.request import Outcome, SolveRequest
+from solver.plain import json_text
 from solver.progress import Progress, silent
 
 DATASETS: dict[DatasetName, Dataset] = {"umpm": UMPM, "kitchen": KITCHEN, "moyo": MOYO}
@@ -36,7 +40,7 @@ _FEWEST = 3
 
 
 def write_sessions(request: DatasetRequest, progress: Progress = silent) -> Outcome:
-    """Cut a dataset into sessions, one folder each, and list them in ``sessions.json``.
+    """Cut a dataset into sessions, one folder each, and list them in ``sessions.json``: all of them or none.
 
     Raises
     ------
@@ -46,29 +50,31 @@ def write_sessions(request: DatasetRequest, progress: Progress = silent) -> Outc
     _check(request, dataset)
     recordings = dataset.find(request.folder, request.options)
     offsets = _offsets(request.offsets, {recording.name for recording in recordings})
-    make_folder(request.out)
     made: list[dict[str, Any]] = []
     notes: list[str] = []
-    for i, recording in enumerate(recordings):
-        progress(i / len(recordings), recording.name)
-        for entry, note in _of_recording(request, dataset, recording, offsets):
-            made += [entry] if entry else []
-            notes += [note] if note else []
-    if not made:
-        raise InputError(
-            f"no window of {dataset.window_s:g} s could be cut from its {len(recordings)} recordings",
-            request.folder,
-            notes[0].removesuffix(".") if notes else "use longer recordings",
-        )
-    content = {
-        "program": f"markerscope {__version__}",
-        "dataset": dataset.title,
-        "rate": RATE,
-        "window_s": dataset.window_s,
-        "sessions": made,
-        "notes": notes,
-    }
-    write_text_atomic(request.out / MANIFEST, json.dumps(content, indent=1) + "\n")
+    # Beside the folder and as deep, since a session names its files from where it lies.
+    staging = request.out.absolute().with_name(f".tmp-{os.getpid()}-{secrets.token_hex(4)}")
+    with together(request.out, staging=staging) as place:
+        for i, recording in enumerate(recordings):
+            progress(i / len(recordings), recording.name)
+            for entry, note in _of_recording(replace(request, out=place), dataset, recording, offsets):
+                made += [entry] if entry else []
+                notes += [note] if note else []
+        if not made:
+            raise InputError(
+                f"no window of {dataset.window_s:g} s could be cut from its {len(recordings)} recordings",
+                request.folder,
+                notes[0].removesuffix(".") if notes else "use longer recordings",
+            )
+        content = {
+            "program": f"markerscope {__version__}",
+            "dataset": dataset.title,
+            "rate": RATE,
+            "window_s": dataset.window_s,
+            "sessions": made,
+            "notes": notes,
+        }
+        write_text_atomic(place / MANIFEST, json_text(content) + "\n")
     line = f"{len(made)} sessions of {len(recordings)} recordings are listed in {request.out / MANIFEST}."
     summary = {"sessions": len(made), "recordings": len(recordings), "out": str(request.out), "notes": notes}
     return Outcome(summary=summary, lines=(line,), warnings=tuple(notes))
@@ -187,7 +193,7 @@ def _write(
     truth = {label: markers.labels[m] for label, m in zip(plain, order, strict=True)}
     path = folder / "markers.c3d"
     write_c3d(path, replace(markers.select(markers=order), labels=plain, R_lab_internal=np.eye(3)), up="z")
-    write_text_atomic(folder / "labels.json", json.dumps(truth, indent=1) + "\n")
+    write_text_atomic(folder / "labels.json", json_text(truth) + "\n")
     video = None
     start, stop = float(markers.time[0]), float(markers.time[-1]) + 1 / markers.rate
     if prior is None and recording.film is not None:

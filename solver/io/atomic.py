@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from solver.errors import InputError
+from solver.plain import shown
 
 _REASONS = {
     errno.ENOSPC: ("the disk is full", "free some space or choose another disk"),
@@ -66,8 +67,11 @@ def write_bytes_atomic(target: str | Path, data: bytes) -> None:
 
 
 def write_text_atomic(target: str | Path, text: str) -> None:
-    """Replace ``target`` by ``text`` in UTF-8 with bare line feeds, whole or not at all."""
-    write_bytes_atomic(target, text.encode("utf-8"))
+    r"""Replace ``target`` by ``text`` in UTF-8 with bare line feeds, whole or not at all.
+
+    Bytes of file names that are not UTF-8 stand in it as ``\xff``.
+    """
+    write_bytes_atomic(target, shown(text).encode("utf-8"))
 
 
 def make_folder(path: str | Path) -> Path:

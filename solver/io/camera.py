@@ -11,6 +11,7 @@ import numpy as np
 from solver.errors import InputError
 from solver.io.atomic import write_text_atomic
 from solver.io.text import read_bytes
+from solver.plain import json_text
 from solver.solve.results import CameraResult
 
 FILE_NAME = "camera.json"
@@ -39,7 +40,7 @@ def write_camera(path: str | Path, camera: CameraResult) -> None:
         "image_size_px": list(camera.image_size),
         "reprojection_px": None if np.isnan(camera.reprojection_px) else camera.reprojection_px,
     }
-    write_text_atomic(Path(path), json.dumps(content, indent=1) + "\n")
+    write_text_atomic(Path(path), json_text(content) + "\n")
 
 
 def read_camera(path: str | Path) -> CameraResult:

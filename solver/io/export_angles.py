@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 
 from solver.angles import JointAngles
 from solver.io.atomic import write_text_atomic
+from solver.plain import json_text
 
 
 def write_angles(
@@ -49,7 +49,7 @@ def write_angles(
         ],
         **provenance,
     }
-    write_text_atomic(folder / "angles.json", json.dumps(about, indent=1) + "\n")
+    write_text_atomic(folder / "angles.json", json_text(about) + "\n")
 
 
 def angles_csv(angles: JointAngles) -> str:

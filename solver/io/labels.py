@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from solver.plain import shown
+
 _BONES = set(
     "HED LCL LFE LFO LHN LHU LRA LTI LTO PEL RCL RFE RFO RHN RHU RRA RTI RTO SPI THX TOR TRX BOX LTX RTX".split()
 )
@@ -43,7 +45,7 @@ def unique(names: Sequence[str], limit: int | None = None, clean: Callable[[str]
 
 
 def _shorten(name: str, limit: int | None) -> str:
-    encoded = name.encode("utf-8", errors="replace")
+    encoded = shown(name).encode("utf-8")
     return encoded[:limit].decode("utf-8", errors="ignore")
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from solver import __version__
 from solver.errors import InputError
 from solver.io.atomic import write_bytes_atomic
+from solver.plain import json_text
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -73,7 +74,7 @@ def save_weights(path: str | Path, params: Mapping[str, Tensor], card: Card) -> 
     if not card.date:
         card = Card(**asdict(card) | {"date": datetime.now(UTC).isoformat(timespec="seconds")})
     tensors = {name: value.detach().contiguous() for name, value in params.items()}
-    write_bytes_atomic(path, save(tensors, {_CARD: json.dumps(asdict(card))}))
+    write_bytes_atomic(path, save(tensors, {_CARD: json_text(asdict(card), indent=None)}))
     return card
 
 

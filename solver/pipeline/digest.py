@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,13 +12,9 @@ from typing import Any
 import numpy as np
 
 from solver.errors import InputError
-from solver.io.atomic import write_text_atomic
 
 KEY_LENGTH = 32
 """Hexadecimal digits of a result's key: 128 bits, short enough for every file system."""
-
-_SETTLED_S = 2.0
-"""A file changed this recently may change again without its time stamp showing it, so it is not remembered."""
 
 
 def canonical(value: Any) -> Any:
@@ -79,45 +74,3 @@ def file_digest(path: str | Path) -> str:
         raise InputError("there is no such file", path, "check the name and the folder") from error
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}", path, "check its permissions") from error
-
-
-class DigestCache:
-    """File digests remembered by path, size and time of change, so that a long video is read once.
-
-    Parameters
-    ----------
-    path : the JSON file it is kept in; a missing or damaged one counts as empty
-    """
-
-    def __init__(self, path: str | Path) -> None:
-        self._path = Path(path)
-        self._known: dict[str, list[Any]] = {}
-        self._changed = False
-        try:
-            known = json.loads(self._path.read_text(encoding="utf-8"))
-            self._known = {str(name): list(row) for name, row in known.items()}
-        except (OSError, ValueError, AttributeError, TypeError):
-            pass
-
-    def digest(self, path: str | Path) -> str:
-        """``file_digest(path)``, from memory if the file is as it was."""
-        name = str(Path(path).resolve())
-        try:
-            status = Path(path).stat()
-        except OSError:
-            return file_digest(path)
-        stamp = [status.st_size, status.st_mtime_ns]
-        row = self._known.get(name)
-        if row is not None and row[:2] == stamp:
-            return str(row[2])
-        value = file_digest(path)
-        if time.time() - status.st_mtime > _SETTLED_S:
-            self._known[name] = [*stamp, value]
-            self._changed = True
-        return value
-
-    def save(self) -> None:
-        """Write what was learned, if anything, and if its folder is there: a refused input must not make one."""
-        if self._changed and self._path.parent.is_dir():
-            write_text_atomic(self._path, json.dumps(self._known, indent=1, sort_keys=True) + "\n")
-            self._changed = False

@@ -8,20 +8,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote, unquote_to_bytes
 
 import tomli_w
 
 from solver import __version__
 from solver.errors import InputError
 from solver.io.atomic import make_folder, write_text_atomic
-from solver.pipeline.digest import DigestCache
+from solver.pipeline.digest_cache import DigestCache
 from solver.pipeline.request import Method
+from solver.pipeline.session_file import FILE_NAME as FILE_NAME
+from solver.pipeline.session_file import sealed
 from solver.pipeline.settings import from_table, overlay, to_table
-from solver.pipeline.stage import Source, Stage
+from solver.pipeline.source import Source
+from solver.pipeline.stage import Stage
 from solver.pipeline.store import Store
+from solver.plain import shown
 
 SCHEMA = 1
-FILE_NAME = "session.toml"
 SUFFIX = ".markerscope"
 _START_AGAIN = "correct it, or delete it and start again from the markers"
 
@@ -123,13 +127,13 @@ def session_folder(path: str | Path) -> Path | None:
 def save_session(session: Session) -> None:
     """Write ``session.toml``, whole or not at all."""
     folder = make_folder(session.folder)
-    write_text_atomic(folder / FILE_NAME, tomli_w.dumps(session_document(session)))
+    write_text_atomic(folder / FILE_NAME, sealed(tomli_w.dumps(session_document(session))))
 
 
 def session_document(session: Session) -> dict[str, Any]:
     """What the session file says, as plain tables; paths are relative to the session's folder."""
     inputs = {
-        name: {"path": _relative(file.path, session.folder), "sha256": file.digest}
+        name: {**_named(_relative(file.path, session.folder)), "sha256": file.digest}
         for name, file in session.inputs.items()
     }
     return {
@@ -137,9 +141,31 @@ def session_document(session: Session) -> dict[str, Any]:
         "program": f"markerscope {__version__}",
         "run": to_table(session.run),
         "inputs": inputs,
-        "settings": {name: dict(table) for name, table in session.settings.items()},
-        "edits": {name: dict(table) for name, table in session.edits.items()},
+        "settings": {name: _sayable(table) for name, table in session.settings.items()},
+        "edits": {name: _sayable(table) for name, table in session.edits.items()},
     }
+
+
+def _sayable(value: Any) -> Any:
+    """Tables whose text TOML can hold."""
+    if isinstance(value, Mapping):
+        return {shown(str(name)): _sayable(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_sayable(item) for item in value]
+    return shown(value) if isinstance(value, str) else value
+
+
+def _named(path: str) -> dict[str, str]:
+    """A path for TOML; where it is no text, its bytes stand beside it, as in an address."""
+    said = shown(path)
+    return {"path": said} if said == path else {"path": said, "path_bytes": quote(os.fsencode(path))}
+
+
+def _path_of(table: Mapping[str, Any]) -> Any:
+    """The path that ``_named`` wrote, or another that somebody wrote over it."""
+    path, content = table.get("path"), table.get("path_bytes")
+    exact = os.fsdecode(unquote_to_bytes(content)) if isinstance(content, str) else path
+    return exact if isinstance(exact, str) and shown(exact) == path else path
 
 
 def load_session(path: str | Path) -> Session:
@@ -195,7 +221,7 @@ def _tables(value: Any, name: str, file: Path) -> dict[str, dict[str, Any]]:
 
 
 def _input_file(table: Mapping[str, Any], name: str, folder: Path, file: Path) -> InputFile:
-    path, digest = table.get("path"), table.get("sha256", "")
+    path, digest = _path_of(table), table.get("sha256", "")
     if not (isinstance(path, str) and path and isinstance(digest, str)):
         raise InputError(f"[inputs.{name}] has no path", file, "add it, or start again from the markers")
     return InputFile(Path(os.path.normpath(folder / path)), digest)

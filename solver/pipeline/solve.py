@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -16,12 +16,15 @@ from solver.errors import InputError
 from solver.io.camera import camera_file
 from solver.outputs import FILES, SOMETIMES, write_outputs
 from solver.pipeline.doubts import assumptions, doubts
+from solver.pipeline.look import look_at
 from solver.pipeline.methods import GRAPHS, graph_of, spelt_out, with_method
 from solver.pipeline.output import remove_if_empty
 from solver.pipeline.request import Method, SolveOutcome, SolveRequest
 from solver.pipeline.session import InputFile, RunSettings, Session, load_session, save_session, session_folder
+from solver.pipeline.session_file import FILE_NAME, edited_by_hand, require_state, state_of
 from solver.pipeline.settings import UNSET, overlay, without
-from solver.pipeline.stage import GraphRun, OnEvent, Source, ignore, run_graph, stage_keys
+from solver.pipeline.source import contents
+from solver.pipeline.stage import GraphRun, OnEvent, ignore, run_graph, stage_keys
 from solver.pipeline.stages import SOURCES
 from solver.progress import Progress, part_of, silent
 from solver.solve.results import Candidate
@@ -41,7 +44,16 @@ def solve_session(request: SolveRequest, progress: Progress = silent, on_event: 
     Raises
     ------
     InputError : an input cannot be used; nothing half-written is left
+    EditedOutside : somebody has changed the session file meanwhile; results stay, files are not written
     """
+    loaded, folder = session_folder(request.markers), _folder(request)
+    state = state_of(folder)
+    if folder != loaded and edited_by_hand(folder):
+        raise InputError(
+            "was edited by hand and would be overwritten",
+            folder / FILE_NAME,
+            f"solve that session itself (markerscope solve {folder}), or choose another folder",
+        )
     session = session_of(request)
     if not {"video_file", "prior_file"} & set(session.inputs):
         raise InputError(
@@ -50,13 +62,14 @@ def solve_session(request: SolveRequest, progress: Progress = silent, on_event: 
     with _tidy(session):
         stages = graph_of(session)
         sources, settings = session.sources(SOURCES), session.stage_settings(stages)
-        session = spelt_out(session, {name: source.digest for name, source in sources.items()})
+        session = spelt_out(session, contents(sources))
         if not session.store.has("landmarks", stage_keys(stages, sources, settings)["landmarks"]):
-            _look_at_small_inputs(sources)
+            look_at({name: source.value for name, source in sources.items()})  # before the video, which takes long
         graph = run_graph(
             stages, sources, settings, session.store, progress=part_of(progress, 0.0, 0.97), on_event=on_event or ignore
         )
         progress(0.97, "writing results")
+        require_state(folder, state, "nothing that was computed is lost; solve again with what it says now")
         write_outputs(session, graph)
         _save(session)
     progress(1.0, "done")
@@ -71,7 +84,7 @@ def session_of(request: SolveRequest) -> Session:
     InputError : a file is not there, or the session cannot be read
     """
     folder = session_folder(request.markers)
-    out = None if request.out is None else Path(os.path.abspath(request.out))
+    out = None if request.out is None else _folder(request)
     if folder is not None:
         session = load_session(folder)
         session = session if out is None else replace(session, folder=out)
@@ -88,6 +101,11 @@ def session_of(request: SolveRequest) -> Session:
         if path is not None:
             session = _with_input(session, f"{name}_file", camera_file(path) if name == "camera" else path)
     return _with_options(session, request)
+
+
+def _folder(request: SolveRequest) -> Path:
+    """Where the session will be."""
+    return Path(os.path.abspath(request.out or session_folder(request.markers) or "."))
 
 
 def _again(out: Path, request: SolveRequest) -> Session:
@@ -183,17 +201,6 @@ def _tidy(session: Session) -> Iterator[None]:
             if new_folder:
                 remove_if_empty(session.folder)
         raise
-
-
-def _look_at_small_inputs(sources: Mapping[str, Source]) -> None:
-    """Refuse what cannot be used before the video is watched, which takes long."""
-    from solver.body.model import Body
-    from solver.io.camera import read_camera
-    from solver.io.priors import load_prior
-
-    for name, read in (("camera_file", read_camera), ("body_file", Body.load), ("prior_file", load_prior)):
-        if sources[name].value is not None:
-            read(sources[name].value)
 
 
 def _outcome(session: Session, graph: GraphRun) -> SolveOutcome:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import graphlib
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, Literal
 
-from solver.errors import Cancelled
-from solver.pipeline.digest import DigestCache, canonical, file_digest, result_key
+from solver.errors import Cancelled, InputError
+from solver.pipeline.digest import canonical, result_key
+from solver.pipeline.pieces import Pieces
+from solver.pipeline.source import Source, Touched, Watch, changed
 from solver.pipeline.store import Absent, Store
 from solver.progress import Found, Progress, part_of, silent, tell
 
@@ -46,21 +48,6 @@ class Stage:
     result: Any
     headline: Callable[[Any], str] = lambda result: ""
     cost: float = 1.0
-
-
-@dataclass(frozen=True)
-class Source:
-    """Something given from outside: a file (or None where the user has none), known by what it holds."""
-
-    value: Any
-    digest: str
-
-    @staticmethod
-    def file(path: str | Path | None, cache: DigestCache | None = None) -> Source:
-        """A file as a source; its name and place do not matter to the results."""
-        if path is None:
-            return Source(None, "none")
-        return Source(Path(path), file_digest(path) if cache is None else cache.digest(path))
 
 
 @dataclass(frozen=True)
@@ -207,13 +194,16 @@ def shares(
 
 @dataclass(frozen=True)
 class _Report:
-    """A stage's progress: what it finds on the way is stamped with its name and key."""
+    """A stage's progress: what it finds on the way is stamped with its name and key, and its files are watched."""
 
     progress: Progress
     stage: str
     key: str
+    watch: Watch
+    pieces: Pieces
 
     def __call__(self, fraction: float, text: str) -> None:
+        self.watch.glance()
         self.progress(fraction, text)
 
     def found(self, found: Found) -> None:
@@ -269,12 +259,10 @@ class _Runner:
         stage, key = self.stages[name], self.keys[name]
         inputs = {i: self.value(i) for i in stage.inputs}
         settings = _settings_of(stage, self.settings)
-        report = _Report(part_of(self.progress, *self.shares.get(name, (0.0, 0.0))), name, key)
         self._tell(Event(name, "running", key))
-        report(0.0, name)
         start = time.perf_counter()
         try:
-            result = stage.run(inputs, settings, report)
+            result = self._run(stage, inputs, settings)
             seconds = time.perf_counter() - start
             headline = stage.headline(result)
             about = {
@@ -293,9 +281,35 @@ class _Runner:
         except Exception as error:
             self._tell(Event(name, "failed", key, text=str(error)))
             raise
+        Pieces(self.store, name, key).discard()
         self.memory[name] = result
         self._tell(Event(name, "cached", key, seconds, headline, computed=True))
-        report(1.0, name)
+        part_of(self.progress, *self.shares.get(name, (0.0, 0.0)))(1.0, name)
+
+    def _run(self, stage: Stage, inputs: Mapping[str, Any], settings: Any) -> Any:
+        """What a stage finds, if the files it read held all the while what their digests say.
+
+        A file that was touched is read once more: somebody may have put another one in its place for a moment.
+        """
+        key, files = self.keys[stage.name], [self.sources[i] for i in stage.inputs if i in self.sources]
+        progress = part_of(self.progress, *self.shares.get(stage.name, (0.0, 0.0)))
+        for _ in range(2):
+            watch = Watch(files)
+            pieces = Pieces(self.store, stage.name, key, watch.look)
+            report = _Report(progress, stage.name, key, watch, pieces)
+            try:
+                report(0.0, stage.name)
+                result = stage.run(inputs, settings, report)
+                watch.end()
+                return result
+            except Touched:
+                continue
+            except InputError:
+                with suppress(Touched):
+                    watch.look()  # else the other content is what could not be used
+                pieces.discard()
+                raise
+        raise changed(files[0].value)
 
     def _tell(self, event: Event) -> None:
         self.events[event.stage] = event

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import secrets
-import shutil
 import zipfile
 from collections.abc import Callable
 from dataclasses import asdict, fields
@@ -18,10 +15,12 @@ from solver import __version__
 from solver.body.bones import with_bone_lengths
 from solver.body.model import Body
 from solver.errors import InputError
-from solver.io.atomic import cannot_write, make_folder, write_text_atomic
+from solver.io.atomic import write_text_atomic
 from solver.io.export_c3d import write_c3d
 from solver.io.export_smpl import write_smpl_npz
 from solver.io.markers_in import load_markers
+from solver.io.together import together
+from solver.plain import json_text
 from solver.prior import PosePrior
 from solver.rotations import exp_so3, log_so3
 from solver.synth.session import SynthSession
@@ -42,19 +41,8 @@ def write_session(folder: str | Path, session: SynthSession) -> None:
     """
     folder = Path(folder)
     check_free(folder)
-    make_folder(folder.absolute().parent)
-    staging = folder.absolute().parent / f".{folder.name[:40]}.{secrets.token_hex(4)}"
-    try:
-        staging.mkdir()
-        _write(staging, session)
-        make_folder(folder)
-        (folder / ABOUT).unlink(missing_ok=True)
-        for name in FILES:
-            os.replace(staging / name, folder / name)
-    except OSError as error:
-        raise cannot_write(folder, error) from error
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+    with together(folder) as place:
+        _write(place, session)
 
 
 def check_free(folder: Path) -> None:
@@ -82,7 +70,7 @@ def _write(folder: Path, session: SynthSession) -> None:
         "true_offset": truth.offset,
         "settings": {k: str(v) if isinstance(v, Path) else v for k, v in asdict(session.settings).items()},
     }
-    write_text_atomic(folder / ABOUT, json.dumps(about, indent=1) + "\n")
+    write_text_atomic(folder / ABOUT, json_text(about) + "\n")
 
 
 def _write_reference(path: Path, truth: Truth) -> None:

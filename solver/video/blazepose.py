@@ -2,66 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 
 from solver.errors import InputError
-from solver.progress import Progress, silent
+from solver.progress import Progress, pieces_of, silent
 from solver.video.ahead import ahead
 from solver.video.blazepose_models import DETECTOR_SIDE, LANDMARK_SIDE, Detection, Detector, LandmarkNetwork, Pose
 from solver.video.frames import announced, read_frames
 from solver.video.landmarks import LANDMARKS, Landmarks
+from solver.video.region import Region
+from solver.video.watched import Row, State, Watched
 
-_MARGIN = 1.25  # of the crop about the circle that holds the body
 _MIN_PRESENCE = 0.5
 _CALM = 0.1  # how much of a tiny move the crop follows from frame to frame
 _MOVE = 0.15  # of the crop's side (or rad): a move that is followed wholly
-
-
-@dataclass(frozen=True)
-class Region:
-    """The turned square that holds a person.
-
-    Attributes
-    ----------
-    centre : (2,) px
-    side : px
-    turn : rad, from the picture's axes to the crop's, clockwise as seen
-    """
-
-    centre: np.ndarray
-    side: float
-    turn: float
-
-    @classmethod
-    def around(cls, centre: np.ndarray, scale_point: np.ndarray) -> Region:
-        """Centred on the hips, upright along the line to the scale point."""
-        x, y = scale_point - centre
-        return cls(centre, 2 * _MARGIN * float(np.hypot(x, y)), float(np.arctan2(x, -y)))
-
-    @property
-    def rotation(self) -> np.ndarray:
-        """(2, 2) from the crop's axes to the picture's."""
-        c, s = np.cos(self.turn), np.sin(self.turn)
-        return np.array([[c, -s], [s, c]])
-
-    def to_picture(self, points: np.ndarray) -> np.ndarray:
-        """Points (N, 2) of the crop, 0..1, in px of the picture (a pixel's centre is at whole numbers)."""
-        return self.centre + (points - 0.5) * self.side @ self.rotation.T
-
-    def crop(self, picture: np.ndarray, size: int, *, outside_black: bool = False) -> np.ndarray:
-        """The square resampled to (size, size, 3); its pixel i covers i/size to (i+1)/size of the side."""
-        import cv2
-
-        linear = self.rotation * (self.side / size)
-        offset = self.to_picture(np.full((1, 2), 0.5 / size))[0]
-        border = cv2.BORDER_CONSTANT if outside_black else cv2.BORDER_REPLICATE
-        matrix = np.hstack([linear, offset[:, None]])
-        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        return np.asarray(cv2.warpAffine(picture, matrix, (size, size), flags=flags, borderMode=border))
 
 
 class Tracker:
@@ -72,6 +29,15 @@ class Tracker:
         self._landmarks = LandmarkNetwork(threads)
         self._region: Region | None = None
         self._last: Region | None = None
+
+    @property
+    def state(self) -> State:
+        """Where the person is, and was last; given back to another tracker, it goes on alike."""
+        return self._region, self._last
+
+    @state.setter
+    def state(self, state: State) -> None:
+        self._region, self._last = state
 
     def __call__(self, picture: np.ndarray) -> tuple[Pose, Region] | None:
         """The person's pose in a picture (H, W, 3) uint8 RGB and the region it refers to, or None."""
@@ -110,6 +76,8 @@ class Tracker:
 def track_pose(path: str | Path, *, rate: float = 30.0, progress: Progress = silent, threads: int = 2) -> Landmarks:
     """Landmarks of the largest, most central person of a video, as the network gives them, unsmoothed.
 
+    Where the listener of the progress keeps pieces (``solver.progress.pieces_of``), it goes on from those there are.
+
     Parameters
     ----------
     path : the video
@@ -124,51 +92,37 @@ def track_pose(path: str | Path, *, rate: float = 30.0, progress: Progress = sil
     video_rate, expected = announced(path)
     stride = max(1, round(video_rate / rate))
     follow = Tracker(threads)
-    rows: list[_Row] = []
-    for row in _rows(path, stride, follow):
-        rows.append(row)
-        progress(min(1.0, row.frame / expected) if expected else 0.0, f"pose in video frame {row.frame}")
-    tracked = np.array([row.tracked for row in rows])
-    if not tracked.any():
+
+    def told(frame: int, text: str) -> None:
+        progress(min(1.0, frame / expected) if expected else 0.0, text)
+
+    with Watched(pieces_of(progress)) as watched:
+        if watched.size:
+            follow.state = watched.state
+        start = watched.next_frame(stride)
+        passed = lambda frame: told(frame, f"going on from video frame {start}")  # noqa: E731
+        for row in _rows(path, stride, follow, start, passed):
+            watched.add(row, follow.state)
+            told(row.frame, f"pose in video frame {row.frame}")
+    found = watched.landmarks(str(path))
+    if not found.tracked.any():
         raise InputError("no person is found in the video", path, "choose a video that shows the whole subject")
-    return Landmarks(
-        image=np.stack([row.image for row in rows]),
-        world=np.stack([row.world for row in rows]),
-        visibility=np.stack([row.visibility for row in rows]),
-        tracked=tracked,
-        time=np.array([row.time for row in rows]),
-        frame=np.array([row.frame for row in rows]),
-        image_size=rows[0].size,
-        source=str(path),
-    )
+    return found
 
 
-@dataclass(frozen=True)
-class _Row:
-    """The landmarks of one frame, as in ``Landmarks``."""
-
-    frame: int
-    time: float
-    size: tuple[int, int]
-    tracked: bool
-    image: np.ndarray
-    world: np.ndarray
-    visibility: np.ndarray
-
-
-def _rows(path: str | Path, stride: int, follow: Tracker) -> Iterator[_Row]:
+def _rows(path: str | Path, stride: int, follow: Tracker, start: int, passed: Callable[[int], None]) -> Iterator[Row]:
     count = len(LANDMARKS)
-    for frame, time, picture in ahead(read_frames(path, stride=stride)):
+    for frame, time, picture in ahead(read_frames(path, stride=stride, start=start, passed=passed)):
         size = (picture.shape[1], picture.shape[0])
         found = follow(picture)
         if found is None:
             nowhere = np.full((count, 2), np.nan), np.full((count, 3), np.nan), np.zeros(count)
-            yield _Row(frame, time, size, False, *nowhere)
+            yield Row(frame, time, size, False, *nowhere)
             continue
         pose, region = found
         world = pose.world.copy()
         world[:, :2] = world[:, :2] @ region.rotation.T
-        yield _Row(frame, time, size, True, region.to_picture(pose.points[:count]), world, pose.visibility[:count])
+        yield Row(frame, time, size, True, region.to_picture(pose.points[:count]), world, pose.visibility[:count])
 
 
 def _region_of(person: Detection, whole: Region) -> Region:

@@ -6,7 +6,7 @@ list drops or that a truncated file no longer holds.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -64,7 +64,12 @@ def index_video(path: str | Path) -> VideoIndex:
 
 
 def read_frames(
-    path: str | Path, wanted: Iterable[int] | None = None, *, stride: int = 1
+    path: str | Path,
+    wanted: Iterable[int] | None = None,
+    *,
+    stride: int = 1,
+    start: int = 0,
+    passed: Callable[[int], None] = lambda index: None,
 ) -> Iterator[tuple[int, float, np.ndarray]]:
     """Decode a video in order and yield ``(index, time in s, upright picture (H, W, 3) uint8 RGB)``.
 
@@ -72,6 +77,8 @@ def read_frames(
     ----------
     wanted : the indices to yield; all where it is None. Indices past the end are left out.
     stride : yield every so many of all frames (with ``wanted`` None)
+    start : index of the first frame to yield (with ``wanted`` None); those before are decoded only, to be counted
+    passed : told the index of every frame before ``start``
     """
     chosen = None if wanted is None else {int(i) for i in wanted}
     last = None if chosen is None else max(chosen, default=-1)
@@ -79,7 +86,9 @@ def read_frames(
         for i, (frame, time, _) in enumerate(decoder):
             if last is not None and i > last:
                 return
-            if i % stride == 0 if chosen is None else i in chosen:
+            if chosen is None and i < start:
+                passed(i)
+            elif i % stride == 0 if chosen is None else i in chosen:
                 yield i, time, decoder.picture(frame)
 
 

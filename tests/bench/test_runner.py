@@ -11,6 +11,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from solver.bench import execute as execution
@@ -21,6 +22,8 @@ from solver.bench.methods import Variant
 from solver.bench.motions import find_motions
 from solver.bench.runner import record_of, record_path, run_all
 from solver.errors import InputError
+from solver.io.export_bvh import write_bvh
+from solver.pipeline.source import Changed
 from tests.bench import jobs
 
 ROOT = Path(__file__).parents[2]
@@ -154,3 +157,13 @@ def test_a_key_is_of_all_that_matters_and_of_nothing_else(tmp_path: Path) -> Non
         replace(run, case=replace(case, settings=replace(case.settings, slide=2.0))),
     )
     assert len({key, gaps[0], *map(key_of, others)}) == 2 + len(others)
+
+
+def test_a_motion_that_changed_leaves_no_record(tmp_path: Path) -> None:
+    motion = tmp_path / "walk.bvh"
+    turns = np.tile(np.eye(3), (4, 2, 1, 1))
+    write_bvh(motion, ("root", "tip"), np.array([-1, 0]), np.eye(2, 3), turns, np.zeros((4, 3)), 30.0)
+    (source,) = find_motions(tmp_path, 1)
+    motion.write_text(motion.read_text().replace("0.000000", "0.500000"))
+    with pytest.raises(Changed, match="changed while it was read"):
+        execute(Run("k", cases_of("short", ())[0], source, "bundle", 0))

@@ -157,3 +157,56 @@ def test_the_hardest_real_recordings_come_through(shared_data: Path, tmp_path: P
     assert (~after.present).any(), "some of it nobody can know"
     spread = np.nanmax(before.positions, axis=(0, 1)) - np.nanmin(before.positions, axis=(0, 1))
     assert (np.nanmax(after.positions, axis=(0, 1)) - np.nanmin(after.positions, axis=(0, 1)) < 1.2 * spread).all()
+
+
+def test_an_expected_error_that_is_not_known_is_null(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "trial.c3d"
+    write_c3d(path, Markers(lose(rigid(), (1, 3, 236)), RATE, tuple("ABCDEFGH")))
+    words = ["clean", str(path), "--out", str(tmp_path / "clean.trc"), "--fill", "spline", "--json"]
+    assert main([*words, "--min-confidence", "0"]) == 0
+    printed = json.loads(capsys.readouterr().out.splitlines()[-1], parse_constant=pytest.fail)
+    listed = json.loads((tmp_path / "clean.changes.json").read_text(), parse_constant=pytest.fail)
+    assert listed["fills"] == printed["fills"] and len(listed["fills"]) == 1
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "trial.c3d", "clean.trc", "clean.filled.csv", "clean.changes.json", "clean.changes.csv"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("fails", ["csv_of", "json_text", "write_markers"])
+@pytest.mark.parametrize("suffix", [".c3d", ".trc", ".csv"])
+def test_all_files_or_none(
+    trial: Path, tmp_path: Path, suffix: str, fails: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise ValueError("Out of range float values are not JSON compliant: inf")
+
+    out = tmp_path / "done" / f"clean{suffix}"
+    clean_file(CleanRequest(trial, out))
+    before = {path.name: path.read_bytes() for path in out.parent.iterdir()}
+    monkeypatch.setattr(f"solver.clean.command.{fails}", fail)
+    for folder in (out.parent, tmp_path / "new"):
+        with pytest.raises(ValueError, match="inf"):
+            clean_file(CleanRequest(trial, folder / out.name, fill="none"))
+    assert {path.name: path.read_bytes() for path in out.parent.iterdir()} == before
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_file_that_changes_while_it_is_read_is_refused(
+    trial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def replaced(path: Path, **how: object) -> Markers:
+        markers = load_markers(path, **how)  # type: ignore[arg-type]
+        path.write_bytes(path.read_bytes() + b"\0")
+        return markers
+
+    monkeypatch.setattr("solver.io.load_markers", replaced)
+    with pytest.raises(InputError, match="changed while it was read; "):
+        clean_file(CleanRequest(trial, tmp_path / "clean.c3d"))
+    assert {path.name for path in tmp_path.iterdir()} == {"trial.c3d"}
+
+
+def test_an_old_list_of_filled_points_does_not_outlive_its_file(trial: Path, tmp_path: Path) -> None:
+    clean_file(CleanRequest(trial, tmp_path / "clean.trc"))
+    assert (tmp_path / "clean.filled.csv").is_file()
+    clean_file(CleanRequest(trial, tmp_path / "clean.trc", fill="none", outliers="none"))
+    assert not (tmp_path / "clean.filled.csv").exists()

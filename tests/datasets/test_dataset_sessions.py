@@ -344,3 +344,25 @@ def test_offsets_that_are_none_are_refused(tmp_path: Path, content: str, message
         write_sessions(
             DatasetRequest("kitchen", tmp_path / "kitchen", tmp_path / "out", offsets=tmp_path / "offsets.json")
         )
+
+
+def test_all_sessions_are_written_or_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    umpm(tmp_path / "umpm")
+    request = DatasetRequest("umpm", tmp_path / "umpm", tmp_path / "out")
+    write_sessions(replace(request, windows=1))
+    before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
+    calls: list[int] = []
+
+    def fail(*_: object) -> tuple[bool, str]:
+        calls.append(1)
+        if len(calls) > 1:
+            raise InputError("the disk is full")
+        return False, ""
+
+    monkeypatch.setattr("solver.datasets.sessions.write_reference", fail)
+    for out in (tmp_path / "out", tmp_path / "new"):
+        calls.clear()
+        with pytest.raises(InputError, match="the disk is full"):
+            write_sessions(replace(request, out=out))
+    assert {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()} == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "umpm"]

@@ -9,9 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from solver.errors import InputError
-from solver.pipeline.stage import Event, NoSettings, Source, Stage, run_graph
+from solver.pipeline.inputs import LandmarkSettings
+from solver.pipeline.source import Source
+from solver.pipeline.stage import Event, NoSettings, Stage, run_graph
+from solver.pipeline.stages import GRAPH as SOLVE
 from solver.pipeline.store import Store
 from solver.progress import Found, part_of, tell
+from solver.video import watched
+
+LANDMARKS = tuple(stage for stage in SOLVE if stage.name == "landmarks")
+RARELY = {"landmarks": LandmarkSettings(rate=3.0)}
 
 
 def add(a: int, b: int, *, progress: Any, on_event: Any) -> int:
@@ -65,3 +72,9 @@ def graph_that_hangs(root: Path, *, progress: Any, on_event: Any) -> None:
 def seek(*, progress: Any, on_event: Any) -> None:
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(lambda i: tell(part_of(progress, 0.0, 0.5), Found("chain", i, {"cost": float(i)})), range(40)))
+
+
+def watch(root: Path, video: Path, *, progress: Any, on_event: Any) -> None:
+    """The landmarks of a video, kept in small pieces."""
+    watched.PIECE = 4
+    run_graph(LANDMARKS, {"video_file": Source.file(video)}, RARELY, Store(root), progress=progress)

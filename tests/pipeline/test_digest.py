@@ -13,8 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solver.errors import InputError
-from solver.pipeline import digest as digest_module
-from solver.pipeline.digest import DigestCache, digest_of, file_digest, result_key
+from solver.pipeline import digest_cache
+from solver.pipeline.digest import digest_of, file_digest, result_key
+from solver.pipeline.digest_cache import DigestCache
 
 
 @dataclass(frozen=True)
@@ -72,21 +73,30 @@ def test_a_key_depends_on_everything_it_should() -> None:
     assert result_key("fit", 1, Settings(), {"prior": "b", "markers": "a"}) == result_key(*base)
 
 
-def test_the_cache_reads_a_file_once_and_again_when_it_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def no_file_is_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(digest_cache, "SMALL_BYTES", 0)
+    monkeypatch.setattr(digest_cache, "_SAMPLE_BYTES", 1)
+
+
+@pytest.mark.usefixtures("no_file_is_small")
+def test_the_cache_reads_a_large_file_once_and_again_when_it_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path, read = tmp_path / "video", []
-    monkeypatch.setattr(digest_module, "file_digest", lambda p: read.append(p) or file_digest(p))
+    monkeypatch.setattr(digest_cache, "file_digest", lambda p: read.append(p) or file_digest(p))
+    monkeypatch.setattr(digest_cache, "_SETTLED_S", -1.0)
     path.write_bytes(b"one")
-    os.utime(path, ns=(10**18, 10**18))
     cache = DigestCache(tmp_path / "cache.json")
     first = cache.digest(path)
     cache.save()
     assert DigestCache(tmp_path / "cache.json").digest(path) == first
     assert len(read) == 1
     path.write_bytes(b"two")
-    os.utime(path, ns=(10**18 + 1000, 10**18 + 1000))
     assert cache.digest(path) == file_digest(path) != first
 
 
+@pytest.mark.usefixtures("no_file_is_small")
 def test_remembering_makes_no_folder(tmp_path: Path) -> None:
     path = tmp_path / "markers"
     path.write_bytes(b"one")
@@ -97,6 +107,7 @@ def test_remembering_makes_no_folder(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.usefixtures("no_file_is_small")
 def test_a_file_that_just_changed_is_not_remembered(tmp_path: Path) -> None:
     # Within a time stamp's resolution, a second change of the same length would go unseen.
     path = tmp_path / "markers"

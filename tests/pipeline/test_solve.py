@@ -13,16 +13,22 @@ import numpy as np
 import pytest
 
 from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
+from solver.body.model import EMBEDDED, Body
 from solver.errors import InputError
+from solver.outputs import write_formats
 from solver.pipeline import solve_session
+from solver.pipeline.digest import file_digest
 from solver.pipeline.request import SolveRequest
-from solver.pipeline.session import load_session, save_session
+from solver.pipeline.run import run_stages
+from solver.pipeline.session import InputFile, load_session, save_session
+from solver.pipeline.session_file import EditedOutside, edited_by_hand
 from solver.pipeline.settings import from_table
 from solver.pipeline.solve import session_of
-from solver.pipeline.stage import Event, Source, stage_keys
+from solver.pipeline.source import Source
+from solver.pipeline.stage import Event, stage_keys
 from solver.pipeline.stages import GRAPH, SOURCES
 from solver.pipeline.worker import Job
+from solver.posed import body_of
 from solver.progress import silent
 from tests.solve.conftest import simulate
 from tests.synthetic import Recording, record, session
@@ -261,3 +267,63 @@ def test_camera_of_an_earlier_solve_with_a_video_goes_with_it(mine: Path) -> Non
     (mine / "angles.csv").unlink()
     solve_session(SolveRequest(mine), silent)
     assert not (mine / "camera.json").exists()
+
+
+def by_hand(folder: Path) -> str:
+    file = folder / "session.toml"
+    file.write_text(file.read_text().replace("offset_mm = 9.5", "offset_mm = 12.5"))
+    assert "offset_mm = 12.5" in file.read_text()
+    return file.read_text()
+
+
+def test_a_session_file_that_is_edited_while_it_is_solved_stays(mine: Path) -> None:
+    text = ""
+
+    def edit(event: Event) -> None:
+        nonlocal text
+        text = text or by_hand(mine)
+
+    before = (mine / "angles.csv").read_bytes()
+    with pytest.raises(EditedOutside, match="was edited since it was read, and is not overwritten; nothing that was"):
+        solve_session(SolveRequest(mine, convention="isb"), silent, edit)
+    assert (mine / "session.toml").read_text() == text
+    assert (mine / "angles.csv").read_bytes() == before, "no files that its settings do not stand for"
+    assert "orient" in computed(SolveRequest(mine)), "what it says now is solved"
+
+
+def test_settings_written_by_hand_are_not_overwritten_by_a_solve_that_says_everything_anew(
+    mine: Path, made: Recording
+) -> None:
+    again = SolveRequest(made.markers, out=mine, prior=made.prior, offset=made.offset)
+    save_session(replace(load_session(mine), edits={"segment": {"left_out": [3]}}))
+    by_hand(mine)
+    before = content(mine)
+    with pytest.raises(InputError, match="was edited by hand and would be overwritten; solve that session itself"):
+        solve_session(again, silent)
+    assert content(mine) == before
+    text = (mine / "session.toml").read_text()
+    (mine / "session.toml").write_text(text.replace("12.5", "9.5").replace("left_out = [\n    3,\n]", "left_out = [4]"))
+    assert session_of(again).edits == {"segment": {"left_out": [4]}}, "edits are made by hand, and kept"
+    assert not edited_by_hand(mine)
+
+
+def test_a_body_that_changed_after_the_fit_is_not_written_with(mine: Path, tmp_path: Path) -> None:
+    session = load_session(mine)
+    graph = run_stages(session)
+    for digest, fits in ((file_digest(EMBEDDED), True), ("0" * 64, False)):
+        other = replace(session, inputs={**session.inputs, "body_file": InputFile(EMBEDDED, digest)})
+        if fits:
+            assert write_formats(tmp_path / "new", other, graph, ["motion"])
+            continue
+        with pytest.raises(InputError, match="changed while it was read"):
+            write_formats(tmp_path / "other", other, graph, ["motion"])
+        assert not (tmp_path / "other").exists()
+
+
+def test_a_result_is_not_compared_on_another_body_than_it_was_solved_with(mine: Path) -> None:
+    session = load_session(mine)
+    save_session(replace(session, inputs={**session.inputs, "body_file": InputFile(EMBEDDED, file_digest(EMBEDDED))}))
+    assert body_of(mine) == EMBEDDED
+    save_session(replace(session, inputs={**session.inputs, "body_file": InputFile(EMBEDDED, "0" * 64)}))
+    with pytest.raises(InputError, match="is not the body any more that the result was solved with; solve again"):
+        body_of(mine)

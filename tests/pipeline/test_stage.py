@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from solver.errors import Cancelled, InputError
-from solver.pipeline.stage import Event, NoSettings, Source, Stage, run_graph, shares, stage_keys, stage_states
+from solver.pipeline.source import Source
+from solver.pipeline.stage import Event, NoSettings, Stage, run_graph, shares, stage_keys, stage_states
 from solver.pipeline.store import Store
 from solver.progress import Found, part_of, tell
 

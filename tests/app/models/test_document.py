@@ -9,6 +9,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.models import edits
@@ -366,3 +367,28 @@ def test_a_session_solved_on_the_command_line_opens(home: Home, tmp_path: Path, 
     document.open(tmp_path / "solved" / FILE_NAME)
     assert document.session == session
     assert (document.name, document.dirty) == ("solved", False)
+
+
+@pytest.mark.parametrize("name", ["body_file", "prior_file", "camera_file", "weights_file"])
+@pytest.mark.parametrize("content", [b"", b"no such thing at all", b"PK\x03\x04 half a zip"])
+def test_a_file_that_cannot_be_used_does_not_stay_in_the_session(
+    saved: Document, tmp_path: Path, name: str, content: bytes
+) -> None:
+    wrong = tmp_path / "wrong.npz"
+    wrong.write_bytes(content)
+    before, steps = saved.session, len(saved.history.steps)
+    with pytest.raises(InputError, match=r"wrong\.npz"):
+        saved.apply(edits.set_input(saved.session, name, wrong))
+    assert saved.session == before and len(saved.history.steps) == steps and not saved.dirty
+    with pytest.raises(InputError, match=r"wrong\.npz"):
+        saved.new({"marker_file": before.inputs["marker_file"].path, name: wrong})
+    assert saved.session == before, "what was open stays open"
+
+
+def test_a_body_of_another_kind_is_said_and_not_taken(saved: Document, tmp_path: Path) -> None:
+    wrong = tmp_path / "hand.npz"
+    np.savez(wrong, weights=np.ones((9, 16)) / 16)
+    before = saved.session
+    with pytest.raises(InputError, match="it is a MANO hand"):
+        saved.apply(edits.set_input(saved.session, "body_file", wrong))
+    assert saved.session == before

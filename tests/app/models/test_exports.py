@@ -101,6 +101,16 @@ def test_where_one_file_cannot_be_made_none_is(board: StageBoard, tmp_path: Path
     assert not list(tmp_path.glob(".tmp-*"))
 
 
+def test_where_a_picture_cannot_be_written_no_file_is(board: StageBoard, tmp_path: Path, monkeypatch) -> None:
+    def refuse(*args: object) -> None:
+        raise InputError("the disk is full")
+
+    monkeypatch.setattr("app.models.exports.write_bytes_atomic", refuse)
+    with pytest.raises(InputError, match="the disk is full"):
+        export(board, tmp_path / "out", ["mot", "pictures"], [Picture("Front view", b"1")])
+    assert not (tmp_path / "out").exists()
+
+
 def test_formats_are_told_apart_and_cover_what_a_solve_writes() -> None:
     assert {name for format in formats() if format.name in STANDARD for name in format.files} == {*FILES, *SOMETIMES}
     assert all(format.title and format.help for format in formats())

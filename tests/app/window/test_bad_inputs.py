@@ -182,3 +182,40 @@ def test_a_folder_that_may_only_be_read(
     assert not [path for path in session.folder.iterdir() if path.name.startswith(".session")]
     monkeypatch.undo()
     assert window.table.trigger("session.save") and not window.bench.document.dirty
+
+
+def test_a_wrong_body_is_said_once_and_not_taken(
+    open_window: Callable[..., MainWindow], spin: Spin, session: Session, tmp_path: Path
+) -> None:
+    wrong = tmp_path / "body.npz"
+    wrong.write_bytes(b"no body")
+    window = open_window()
+    window.open_path(session.folder)
+    spin(lambda: window.shown.track is not None, "the fit")
+    before = window.bench.document.session
+    window.asks.file_to_open = lambda what: wrong  # type: ignore[method-assign]
+    assert not window.table.trigger("input.body")
+    assert "body.npz" in only_error(window)
+    assert window.bench.document.session == before and not window.bench.document.dirty
+    for _ in range(5):
+        window.bench.clock.step(1)
+        spin()
+    assert not window.messages.messages()
+
+
+def test_a_body_that_is_spoilt_later_is_said_once(
+    open_window: Callable[..., MainWindow], spin: Spin, session: Session, tmp_path: Path
+) -> None:
+    wrong = tmp_path / "body.npz"
+    wrong.write_bytes(b"no body")
+    save_session(replace(session, inputs={**session.inputs, "body_file": InputFile(wrong)}))
+    window = open_window()
+    window.open_path(session.folder)
+    spin(lambda: window.bench.clock.timing.frames > 0, "the markers")
+    for _ in range(8):
+        window.bench.clock.step(1)
+        spin()
+    assert "body.npz" in only_error(window)
+    assert window.shown.track is None and window.shown.get("markers") is not None
+    window.bench.document.apply(edits.set_input(window.bench.document.session, "body_file", None))
+    spin(lambda: window.shown.track is not None, "the fit on the program's own body")
