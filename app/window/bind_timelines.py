@@ -16,6 +16,7 @@ from app.window.ghosts import Ghosts
 from app.window.keys import how
 from app.window.residual_menu import ResidualMenu
 from app.window.shown import Shown
+from solver.solve.counting import candidate_number
 from solver.sync import Sync
 from widgets import palette
 from widgets.plots.rows import Curve, CurveRow, Row
@@ -186,7 +187,7 @@ class TimelinesBinder:
             "residual of the candidate",
             (track, markers, asked),
             lambda: views.candidate_curve(
-                track, markers, f"candidate {row + 1}", palette.categorical(12)[row % 12], statistic, chosen
+                track, markers, f"candidate {candidate_number(row)}", palette.categorical(12)[row % 12], statistic, chosen
             ),
         )
         return cast(Curve, made)

@@ -16,6 +16,7 @@ from app.views.candidates import part_of_bones
 from app.views.colours import RGB, rgb
 from app.views.convergence import EnergyCurve
 from app.window.shown import Shown
+from solver.solve.counting import candidate_number
 from solver.solve.results import Localization
 from widgets import palette
 
@@ -111,7 +112,7 @@ class Ghosts:
         track = self.candidate_track()
         if track is not None:
             chosen = self.bench.selection.candidate or 0
-            title = f"Candidate {chosen + 1}: {self.shown.get('orient').candidates[chosen].part}"
+            title = f"Candidate {candidate_number(chosen)}: {self.shown.get('orient').candidates[chosen].part}"
             return Ghost("candidate", title, track, _colour(chosen))
         found, prior, sync = (self.shown.get(name) for name in ("localize", "prior", "sync"))
         row, markers = self.bench.selection.hypothesis, self.shown.markers
