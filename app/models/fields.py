@@ -120,9 +120,7 @@ def settings_of(stage: str, settings: Any, decided: frozenset[str] = frozenset()
             _tidy(v * factor) if isinstance(v, float) else v + first if first and v is not None else v
             for v in (getattr(settings, field.name), getattr(default, field.name))
         )
-        low, high = (
-            end if end is None else end + first for end in _range(stage, field.name, kind, standard, factor)
-        )
+        low, high = (end if end is None else end + first for end in _range(stage, field.name, kind, standard, factor))
         found.append(
             Setting(
                 stage,

@@ -28,7 +28,7 @@ from widgets.theme import colours
 _LOOK = {
     "not run": ("not_run", "faint"),
     "cached": ("cached", "good"),
-    "stale": ("stale", "warning"),
+    "stale": ("out of date", "warning"),
     "running": ("running", "accent"),
     "failed": ("failed", "error"),
 }

@@ -17,6 +17,7 @@ from widgets.plots.rows import Curve
 from widgets.plots.scales import Scale, clock, limits, number, time_ticks
 from widgets.theme import colours
 
+OUT_OF_DATE = "out of date"
 _COLUMN_EM = 34.0
 """Lines of text that a column of plots is wide before there are two."""
 
@@ -39,6 +40,7 @@ class AnglePlots(QWidget):
         self._view = (0.0, 1.0)
         self._cursor = 0.0
         self._joint: str | None = None
+        self._old = False
         self._picture: QPixmap | None = None
 
     def set_joint(self, joint: str | None) -> None:
@@ -47,8 +49,9 @@ class AnglePlots(QWidget):
             self._joint = joint
             self.update()
 
-    def set_plots(self, time: np.ndarray, plots: Sequence[Any], view: tuple[float, float]) -> None:
-        """Show these, see :class:`AnglePlot`, over the part ``view`` of the clock, s."""
+    def set_plots(self, time: np.ndarray, plots: Sequence[Any], view: tuple[float, float], old: bool = False) -> None:
+        """Show these, see :class:`AnglePlot`, over the part ``view`` of the clock, s; pale where they are ``old``."""
+        self._old = old
         self._time, self._plots, self._view = time, tuple(plots), view
         self._picture = None
         self._fit()
@@ -179,7 +182,12 @@ class AnglePlots(QWidget):
                 ink = np.array(curve.colour, np.uint8)
                 if curve.reference is not None:
                     draw_curve(painter, area, x, y, Curve("", curve.reference, ink, dashed=True), self._time)
-                draw_curve(painter, area, x, y, Curve(curve.name, curve.degrees, ink), self._time)
+                own = Curve(curve.name, curve.degrees, ink, dashed=self._old, old=self._old)
+                draw_curve(painter, area, x, y, own, self._time)
+            if self._old:
+                painter.setPen(colour(look.warning))
+                box = area.adjusted(6, 0, -6, -2)
+                painter.drawText(box, int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom), OUT_OF_DATE)
             painter.setClipping(False)
             if k + columns >= len(areas):
                 self._draw_clock(painter, area, x)
