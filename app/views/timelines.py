@@ -119,9 +119,7 @@ def residual_row(
         values = 1000 * on_clock(time, motion.time, over_markers(residual, statistic))
         rank = i if ranks is None else ranks[label]
         curves.append(
-            Curve(
-                label, values, palette.categorical(rank + 1)[rank], dashed=label != own or old, old=label == own and old
-            )
+            Curve(label, values, palette.categorical(rank + 1)[rank], dashed=label != own, old=label == own and old)
         )
     curves += also
     whose = "all markers" if markers is None else f"{len(markers)} selected marker{'s' if len(markers) != 1 else ''}"

@@ -28,7 +28,8 @@ def note_of(shown: Shown, view: str) -> str:
     old = shown.out_of_date(DRAWN[view])
     if not old:
         return ""
-    return f"Out of date: {', '.join(title(stage) for stage in old)}. From before the last change; run it again."
+    names = ", ".join(title(stage) for stage in old)
+    return f"Out of date: {names}. A setting or a file has changed since; Run all (F5) brings this up to date."
 
 
 class DatedBinder:

@@ -133,7 +133,7 @@ class TimelinesBinder:
     def _residual(self) -> CurveRow | None:
         """Every fit that is in the store and not hidden, the one shown in the scene first, and the chosen candidate."""
         shown, display, board = self.shown, self.bench.display, self.bench.board
-        tracks, motion = shown.tracks, shown.fit
+        tracks, motion = shown.tracks, shown.get("fit")
         assert tracks is not None
         chosen = self._chosen()
         fits: dict[str, views.Residuals] = {}

@@ -58,7 +58,7 @@ class VideoBinder:
                 self.widget.set_frame(None, f"Reading the video: {100 * frames.part:.0f} %")
             return
         count = len(frames.times)
-        which = "" if frame.number is None else f"frame {frame.number} of {count}   "
+        which = "" if frame.number is None else f"frame {frame.number} / {count - 1}   "
         old = ", ".join(title(stage) for stage in self._old())
         self.widget.set_frame(frame.picture, f"{which}{frame.time:.3f} s{f'   out of date: {old}' if old else ''}")
         self._overlays(frame)

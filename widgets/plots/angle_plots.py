@@ -162,11 +162,11 @@ class AnglePlots(QWidget):
         areas, columns = self.areas(), self.columns()
         for k, (plot, area) in enumerate(zip(self._plots, areas)):
             painter.fillRect(area, colour(look.base))
-            painter.setPen(colour(look.text))
+            painter.setPen(colour(look.warning if self._old else look.text))
             metrics = QFontMetricsF(self.font())
             beside = len(plot.curves) * (metrics.horizontalAdvance("L −000.0°") + 24)
             room = QRectF(area.left(), area.top() - 1.2 * line, max(area.width() - beside, 40), 1.1 * line)
-            elided(painter, room, plot.title)
+            elided(painter, room, f"{plot.title}, {OUT_OF_DATE}" if self._old else plot.title)
             low, high = limits(
                 [c.degrees for c in plot.curves] + [c.reference for c in plot.curves if c.reference is not None]
             )
@@ -182,12 +182,8 @@ class AnglePlots(QWidget):
                 ink = np.array(curve.colour, np.uint8)
                 if curve.reference is not None:
                     draw_curve(painter, area, x, y, Curve("", curve.reference, ink, dashed=True), self._time)
-                own = Curve(curve.name, curve.degrees, ink, dashed=self._old, old=self._old)
+                own = Curve(curve.name, curve.degrees, ink, old=self._old)
                 draw_curve(painter, area, x, y, own, self._time)
-            if self._old:
-                painter.setPen(colour(look.warning))
-                box = area.adjusted(6, 0, -6, -2)
-                painter.drawText(box, int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom), OUT_OF_DATE)
             painter.setClipping(False)
             if k + columns >= len(areas):
                 self._draw_clock(painter, area, x)
