@@ -83,7 +83,7 @@ class History:
     def note_for(self, session: Session, answers: Mapping[str, str]) -> bool:
         """Remember results for every step whose session is this one, wherever it is; False where nothing is new."""
         same = [i for i, step in enumerate(self.steps) if step.session == session]
-        return any([self._note(i, answers) for i in same])
+        return sum(self._note(i, answers) for i in same) > 0  # every one is told
 
     def in_force_before(self, stage: str) -> Iterator[str]:
         """Keys of a stage's results that were in force on the way to the session as it is now, the last first.

@@ -1,7 +1,7 @@
 """What is drawn: the result of the settings in force, or of the last ones in force, and never another.
 
-A random walk over edits, undo, redo, runs, cancels, files that change, other programs, saving, closing and crashes. What
-there is to draw is compared with a plain record of what was the answer of the settings, state by state.
+A random walk over edits, undo, redo, runs, cancels, files that change, other programs, saving, closing and crashes.
+What there is to draw is compared with a plain record of what was the answer of the settings, state by state.
 """
 
 from __future__ import annotations

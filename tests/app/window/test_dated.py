@@ -44,7 +44,7 @@ def near(picture: np.ndarray, rgb: tuple[int, int, int], within: int = 40) -> in
 
 
 class Record:
-    """By stage, what was the answer of the settings, state by state of the line of history: kept apart from the models."""
+    """By stage, what was the answer of the settings, state by state of the history: kept apart from the models."""
 
     def __init__(self, session: Session) -> None:
         self.line: list[dict[str, str]] = [{}]
