@@ -246,6 +246,16 @@ def test_a_fit_that_was_undone_does_not_come_back_with_the_next_edit(walk: Walk)
     walk.what_there_is_to_draw_was_the_answer()
 
 
+def test_nothing_is_drawn_of_an_answer_that_was_undone(walk: Walk) -> None:
+    walk.edit(3)
+    walk.run_and_perhaps_cancel(13)
+    wanted = walk.board.latest("fit")
+    walk.undo_or_redo(-1)
+    assert (walk.board.latest("fit"), walk.board.state("fit")) == (None, "not run")
+    walk.undo_or_redo(1)
+    assert walk.board.latest("fit") == wanted
+
+
 def test_a_result_that_arrives_after_the_next_edit_is_the_last_one_in_force(walk: Walk) -> None:
     walk.run_and_perhaps_cancel(13)
     walk.edit(5)
