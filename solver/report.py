@@ -10,6 +10,7 @@ from resources import resource
 from solver.io.atomic import write_text_atomic
 from solver.report_data import ReportData
 from solver.report_svg import affinity_cap, affinity_legend, affinity_plot, angle_plot, gaps_plot
+from solver.solve.counting import candidate_number
 
 
 def write_report(path: str | Path, data: ReportData) -> None:
@@ -41,6 +42,7 @@ def render(data: ReportData) -> str:
         data=data,
         pictures=[(p.caption, base64.b64encode(p.png).decode("ascii")) for p in data.pictures],
         terms=terms,
+        number=candidate_number,
         best=min((h.energy for h in data.hypotheses if h.refined), default=math.nan),
         margin=_margin(data.margin) if data.hypotheses else "",
         affinity=Markup(affinity_plot(data.groups)) if data.groups and len(data.groups.order) else "",

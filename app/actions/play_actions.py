@@ -8,7 +8,7 @@ import numpy as np
 
 from app.actions.action import Action, Asks, first, needs
 from app.models.clock import Clock
-from app.models.workbench import Workbench
+from app.models.workbench import Said, Workbench
 from solver.errors import InputError
 
 
@@ -41,16 +41,24 @@ def _worst(bench: Workbench, asks: Asks) -> None:
 
 
 def _next_gap(bench: Workbench, asks: Asks) -> None:
-    """Go to the next frame in which one of the selected markers, or of all, is lost."""
-    present = bench.board.current["markers"].present
-    chosen = sorted(bench.selection.markers) or slice(None)
-    whole = present[:, chosen].all(axis=1)
-    starts = np.flatnonzero(~whole & np.concatenate([[True], whole[:-1]]))
+    """Go to the next frame from which one of the selected markers, or of all, is lost; beyond the last, to the first.
+
+    Every marker's gaps count by themselves: in a real recording there is hardly a frame that shows them all.
+    """
+    markers = bench.board.current["markers"]
+    chosen = sorted(m for m in bench.selection.markers if m < len(markers.labels)) or list(range(len(markers.labels)))
+    lost = ~markers.present[:, chosen]
+    begins = lost & ~np.concatenate([np.zeros((1, len(chosen)), bool), lost[:-1]])
+    starts = np.flatnonzero(begins.any(axis=1))
     if not len(starts):
-        raise InputError("no marker is lost", "the next gap", "select others")
+        whose = "the selected markers are" if bench.selection.markers else "every marker is"
+        raise InputError(f"{whose} seen in every frame", "the next gap")
     here = bench.clock.marker_frame or 0
     later = starts[starts > here]
-    bench.clock.seek_marker_frame(int(later[0] if len(later) else starts[0]))
+    frame = int(later[0] if len(later) else starts[0])
+    if frame == here:
+        bench.say(Said("note", "This is the only gap", "the next gap"))
+    bench.clock.seek_marker_frame(frame)
 
 
 def _action(id: str, title: str, help: str, act: Callable[[Clock], object], shortcut: str) -> Action:
@@ -92,7 +100,7 @@ PLAY_ACTIONS = (
         "go.gap",
         "Next gap",
         "Play",
-        "Go to the next frame in which a selected marker, or any, is lost.",
+        "Go to the next frame from which a selected marker, or any where none is selected, is lost.",
         _next_gap,
         "N",
         first(_empty, needs("markers", "the markers have not been read")),

@@ -14,7 +14,7 @@ from typing import Any
 from app.models.edits import Edit, existing
 from app.models.history import History, Step
 from app.models.home import Home
-from app.models.journal import JOURNAL, VIEW, Writer, journal_of, read_journal, read_view
+from app.models.journal import IN_FORCE, JOURNAL, VIEW, Writer, journal_of, read_answers, read_journal, read_view
 from app.models.keep import kept_decisions
 from app.models.signal import Signal
 from solver.errors import InputError
@@ -35,6 +35,7 @@ class Document:
     Attributes
     ----------
     changed : emitted when the session is another or has changed (a decision, undo, redo), with whether it is another
+    leaving : emitted before the session changes, while it still is what it was
     saved : emitted when ``dirty``, ``folder`` or the list of recent sessions may have changed
     view : how the window looked when the session was last open, by part of the window
     recovered : whether decisions came back that a crash had kept from being saved
@@ -43,6 +44,7 @@ class Document:
     def __init__(self, home: Home) -> None:
         self.home = home
         self.changed: Signal[[bool]] = Signal()
+        self.leaving: Signal[[]] = Signal()
         self.saved: Signal[[]] = Signal()
         self.view: dict[str, Any] = {}
         self.recovered = False
@@ -178,6 +180,7 @@ class Document:
         edit.session.stage_settings(graph_of(edit.session))
         look_at({name: file.path for name, file in edit.session.inputs.items() if before.inputs.get(name) != file})
         edit = kept_decisions(before, edit)
+        self.leaving.emit()
         self.history.add(Step(edit.sentence, time.time(), edit.session, edit.merge))
         self._after_change()
 
@@ -191,8 +194,19 @@ class Document:
 
     def go_to(self, position: int) -> None:
         """Have the session as it was after a step of the history."""
+        self.leaving.emit()
         if self.history.go_to(position):
             self._after_change()
+
+    def note(self, answers: Mapping[str, str]) -> None:
+        """Remember which results, key by stage, are in force now."""
+        if self.history.note(answers):
+            self._keep()
+
+    def note_for(self, session: Session, answers: Mapping[str, str]) -> None:
+        """Remember results, key by stage, that arrive when the session they were computed for may be left already."""
+        if self.is_open and self.history.note_for(session, answers):
+            self._keep()
 
     def save(self) -> None:
         """Write the session file, with every setting and what the inputs hold.
@@ -270,6 +284,7 @@ class Document:
         """
         if self._history is None:
             return
+        self.leaving.emit()
         folder, untitled = self.folder, self.untitled
         if not (untitled and keep_untitled):
             self._writer.write(folder / JOURNAL, None)
@@ -289,7 +304,8 @@ class Document:
         history: History | None = None,
         state: str = "",
     ) -> None:
-        self._history = history or History([Step(sentence, time.time(), session)])
+        answers = read_answers(session.folder)
+        self._history = history or History([Step(sentence, time.time(), session, answers=answers)])
         self._on_disk, self._state = on_disk, state
         self.recovered = history is not None and session != on_disk
         self.view = read_view(session.folder)
@@ -304,6 +320,8 @@ class Document:
 
     def _keep(self) -> None:
         self._writer.write(self.folder / JOURNAL, journal_of(self.history, self._state))
+        if not self.dirty:
+            self._writer.write(self.folder / IN_FORCE, self.history.answers_at(self.history.position))
 
     def _require_state(self) -> None:
         require_state(self.folder, self._state, "save yours in another folder, or take the one on disk")

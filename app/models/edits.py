@@ -18,6 +18,7 @@ from solver.pipeline.methods import with_method as solved_by
 from solver.pipeline.request import Method
 from solver.pipeline.session import InputFile, Session
 from solver.pipeline.settings import UNSET, overlay, to_table, without
+from solver.solve.counting import candidate_number
 
 DECISIONS = {
     "markers": ("start", "stop"),
@@ -115,7 +116,7 @@ def find_offset(session: Session) -> Edit:
 
 def pin_candidate(session: Session, row: int) -> Edit:
     """Go on from this row of the ranked candidates."""
-    return Edit(f"Candidate {row + 1} pinned", decide(session, "fit", {"candidate": int(row)}))
+    return Edit(f"Candidate {candidate_number(row)} pinned", decide(session, "fit", {"candidate": int(row)}))
 
 
 def unpin_candidate(session: Session) -> Edit:

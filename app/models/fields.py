@@ -12,6 +12,7 @@ from functools import cache
 from typing import Any, Literal
 
 from app.models.ranges import RANGES
+from solver.solve.counting import candidate_number
 
 Kind = Literal["float", "int", "bool", "choice", "text"]
 
@@ -30,6 +31,8 @@ TITLES = {
     "angles": "Joint angles",
     "surface": "Distance to the skin",
 }
+_COUNTED = "fit", "candidate"
+"""The setting that is a row, and is shown as a candidate's number."""
 _UNITS = {"m": "m", "mm": "mm", "s": "s", "Hz": "Hz", "px": "px", "degrees": "deg", "degree": "deg"}
 _SUFFIXES = {"_mm": "mm", "_deg": "deg", "_s": "s", "_px": "px", "_hz": "Hz"}
 _STARTS_WITH_UNIT = re.compile(rf"({'|'.join(_UNITS)})(?:$|[,;:.]\s*|\s+(?=in the ))")
@@ -51,7 +54,7 @@ class Setting:
     optional : whether None may be chosen
     help : what it means
     decided : whether the value is a decision by hand, laid over the settings
-    factor : shown value = factor * the solver's
+    factor, first : shown value = factor * the solver's + first
     """
 
     stage: str
@@ -68,6 +71,7 @@ class Setting:
     help: str = ""
     decided: bool = False
     factor: float = 1.0
+    first: int = 0
 
     @property
     def changed(self) -> bool:
@@ -78,7 +82,7 @@ class Setting:
         """A shown value as the solver counts it."""
         if shown is None or self.kind not in ("float", "int"):
             return shown
-        return int(shown) if self.kind == "int" else _tidy(float(shown) / self.factor)
+        return int(shown) - self.first if self.kind == "int" else _tidy(float(shown) / self.factor)
 
     def said(self, shown: Any) -> str:
         """A shown value in words, with its unit."""
@@ -111,11 +115,12 @@ def settings_of(stage: str, settings: Any, decided: frozenset[str] = frozenset()
             continue
         unit, text = _unit(field.name, texts.get(field.name, ""))
         unit, factor = ("mm", 1000.0) if unit == "m" else (unit, 1.0)
+        first = candidate_number(0) if (stage, field.name) == _COUNTED else 0
         value, standard = (
-            _tidy(v * factor) if isinstance(v, float) else v
+            _tidy(v * factor) if isinstance(v, float) else v + first if first and v is not None else v
             for v in (getattr(settings, field.name), getattr(default, field.name))
         )
-        low, high = _range(stage, field.name, kind, standard, factor)
+        low, high = (end if end is None else end + first for end in _range(stage, field.name, kind, standard, factor))
         found.append(
             Setting(
                 stage,
@@ -132,6 +137,7 @@ def settings_of(stage: str, settings: Any, decided: frozenset[str] = frozenset()
                 text,
                 field.name in decided,
                 factor,
+                first,
             )
         )
     return tuple(found)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from solver.pipeline.session import Session
 
@@ -22,12 +22,14 @@ class Step:
     when : s since the epoch
     session : afterwards
     merge : what was dialled, if a value was
+    answers : by stage, the key of the result that was last in force while the session was so
     """
 
     sentence: str
     when: float
     session: Session
     merge: str = ""
+    answers: Mapping[str, str] = field(default_factory=dict)
 
 
 class History:
@@ -62,12 +64,50 @@ class History:
         """Go on from here with a new step; what was undone is gone."""
         last = self.steps[self.position]
         dialled = step.merge and step.merge == last.merge and step.when - last.when < _DIALLED_S and self.position
+        if dialled:  # what was in force on the way was so on this line
+            step = replace(step, answers={**last.answers, **step.answers})
         del self.steps[self.position + (0 if dialled else 1) :]
         if not (dialled and step.session == self.steps[-1].session):  # dialled back to where it was: no step at all
             self.steps.append(step)
-        if len(self.steps) > _MOST:
-            del self.steps[1 : len(self.steps) - _MOST + 1]
         self.position = len(self.steps) - 1
+        if len(self.steps) > _MOST:
+            first = len(self.steps) - _MOST + 1
+            kept = replace(self.steps[first], answers=self.answers_at(first))
+            self.steps[1 : first + 1] = [kept]
+            self.position = len(self.steps) - 1
+
+    def note(self, answers: Mapping[str, str]) -> bool:
+        """Remember results that are in force now, key by stage; False where nothing of it is new."""
+        return self._note(self.position, answers)
+
+    def note_for(self, session: Session, answers: Mapping[str, str]) -> bool:
+        """Remember results for every step whose session is this one, wherever it is; False where nothing is new."""
+        same = [i for i, step in enumerate(self.steps) if step.session == session]
+        return sum(self._note(i, answers) for i in same) > 0  # every one is told
+
+    def in_force_before(self, stage: str) -> Iterator[str]:
+        """Keys of a stage's results that were in force on the way to the session as it is now, the last first.
+
+        What was in force only on a way that was undone is not among them.
+        """
+        for step in self.steps[self.position :: -1]:
+            if stage in step.answers:
+                yield step.answers[stage]
+
+    def _note(self, place: int, answers: Mapping[str, str]) -> bool:
+        step = self.steps[place]
+        known = {**step.answers, **answers}
+        if known == step.answers:
+            return False
+        self.steps[place] = replace(step, answers=known)
+        return True
+
+    def answers_at(self, position: int) -> dict[str, str]:
+        """The results, key by stage, that were last in force on the way to a step."""
+        found: dict[str, str] = {}
+        for step in self.steps[: position + 1]:
+            found |= step.answers
+        return found
 
     def restate(self, session: Session) -> None:
         """Have the session that is there now say the same in other words."""

@@ -13,6 +13,7 @@ from app.models.signal import Signal
 from app.models.stages import Failure, StageBoard
 from solver.errors import Cancelled, InputError
 from solver.pipeline.run import run_session
+from solver.pipeline.session import Session
 from solver.pipeline.stage import Event, shares
 from solver.pipeline.worker import Failed, Finished, Job, Message, Progressed
 from solver.progress import Found
@@ -48,6 +49,7 @@ class Running:
 @dataclass
 class _Work:
     job: Job
+    session: Session
     shares: dict[str, tuple[float, float]]
     expected: dict[str, float]
     last: Ref | None = None
@@ -120,7 +122,7 @@ class Runner:
         if not parts:
             return False
         job = Job(run_session, session, tuple(wanted), store=session.store, again=tuple(again))
-        self._work = _Work(job, parts, self._expected(parts), since=self._clock())
+        self._work = _Work(job, session, parts, self._expected(parts), since=self._clock())
         self._work.at = Running(text="starting", seconds_left=sum(self._work.expected.values()))
         self.changed.emit()
         return True
@@ -190,7 +192,7 @@ class Runner:
             work.expected.pop(event.stage, None)
             self.notes.pop(ref, None)
             self.board.results.forget(ref.stage, ref.key)
-            self.board.end()
+            self.board.land(ref, work.session)
             self.landed.emit(ref)
 
     def _end(self, failure: Failure | None) -> None:

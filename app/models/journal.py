@@ -1,19 +1,21 @@
 """What keeps a session through a crash: every decision since it was opened, and how the window looked.
 
 ``journal.json`` lies in the session's folder while the session is open; one that is found when a session is opened was
-left by a crash (or belongs to another window that has it open). Files are written by a thread, the latest state only,
-so that no decision waits for the disk.
+left by a crash (or belongs to another window that has it open). ``in_force.json`` says which results the saved session
+had: after a setting was changed they, and no others in the store, are drawn as out of date. Files are written by a
+thread, the latest state only, so that no decision waits for the disk.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import socket
 import threading
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,8 @@ from solver.pipeline.session import session_document, session_from
 
 JOURNAL = "journal.json"
 VIEW = "view.json"
+IN_FORCE = "in_force.json"
+_KEY = re.compile(r"[0-9a-z]+")
 _PAUSE_S = 0.3
 """Between two writes, so that a camera that is turned does not keep the disk busy."""
 _KEPT = 60
@@ -52,7 +56,12 @@ def read_journal(folder: Path) -> Left | None:
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         steps = [
-            Step(str(row["sentence"]), float(row["when"]), session_from(row["session"], folder, file))
+            Step(
+                str(row["sentence"]),
+                float(row["when"]),
+                session_from(row["session"], folder, file),
+                answers=_answers(row.get("answers")),
+            )
             for row in content["steps"]
         ]
         position = int(content["position"])
@@ -68,15 +77,36 @@ def journal_of(history: History, state: str) -> dict[str, Any]:
     """What is written down of a history, and of the session file's ``state`` that it stands on."""
     first = max(0, min(history.position, len(history.steps) - _KEPT))
     steps = history.steps[first : first + _KEPT]
+    steps[0] = replace(steps[0], answers=history.answers_at(first))
     return {
         "process": os.getpid(),
         "computer": socket.gethostname(),
         "state": state,
         "position": history.position - first,
         "steps": [
-            {"sentence": step.sentence, "when": step.when, "session": session_document(step.session)} for step in steps
+            {
+                "sentence": step.sentence,
+                "when": step.when,
+                "session": session_document(step.session),
+                "answers": dict(step.answers),
+            }
+            for step in steps
         ],
     }
+
+
+def read_answers(folder: Path) -> dict[str, str]:
+    """The results, key by stage, that were last in force when the session was saved; empty where that is not known."""
+    try:
+        return _answers(json.loads((folder / IN_FORCE).read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        return {}
+
+
+def _answers(content: Any) -> dict[str, str]:
+    """Keys by stage, as far as they can be understood."""
+    rows = content.items() if isinstance(content, dict) else ()
+    return {stage: key for stage, key in rows if isinstance(key, str) and _KEY.fullmatch(key)}
 
 
 def read_view(folder: Path) -> dict[str, Any]:

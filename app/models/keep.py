@@ -17,6 +17,7 @@ from solver.pipeline.session import Session
 from solver.pipeline.source import Source
 from solver.pipeline.stage import stage_keys
 from solver.pipeline.stages import SOURCES
+from solver.solve.counting import candidate_number
 
 _BY_COLUMN = ("merges", "splits", "moves", "left_out")
 _BY_FRAME = ("keep", "swaps", "joins")
@@ -40,7 +41,7 @@ def kept_decisions(before: Session, edit: Edit) -> Edit:
     pinned, still = (session.edits.get("fit", {}).get("candidate") for session in (before, after))
     if pinned is not None and still == pinned and _ranking(before) != _ranking(after):
         after = _with(after, "fit", {name: v for name, v in after.edits["fit"].items() if name != "candidate"})
-        lost.append(f"candidate {pinned + 1} is no longer pinned")
+        lost.append(f"candidate {candidate_number(pinned)} is no longer pinned")
     if not lost:
         return edit
     return replace(edit, session=after, sentence="; ".join((edit.sentence, *lost)))

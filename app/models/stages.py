@@ -81,7 +81,7 @@ class Card:
     state : cached, stale, running, failed, not run
     key : of the result that the settings ask for
     seconds : how long the result took, None without one
-    headline : of the result; why it failed; or, where it is stale, of the latest result there is
+    headline : of the result; why it failed; or, where it is stale, of the result that was last in force
     fields : its settings
     earlier : its results, the newest first
     why_not : why it cannot be run, empty if it can
@@ -126,6 +126,7 @@ class StageBoard:
         self._failures: dict[Ref, Failure] = {}
         self._said: dict[Ref, str] = {}  # how each earlier result's settings differ, while the settings stay
         document.changed.connect(self._follow)
+        document.leaving.connect(self._note)
         if document.is_open:
             self._follow(True)
 
@@ -151,17 +152,27 @@ class StageBoard:
             return "cached"
         if ref in self._failures:
             return "failed"
-        return "stale" if self.results.entries(stage) else "not run"
+        return "not run" if self.latest(stage) is None else "stale"
 
     def latest(self, stage: str) -> tuple[str, bool] | None:
-        """Key of what there is to draw of a stage, and whether it is in force; a stale one is to be drawn as such."""
+        """Key of what there is to draw of a stage, and whether it is in force; a stale one is to be drawn as such.
+
+        Where the settings have no result, it is the one that was last in force on the way to them. Whatever else is in
+        the store (of a decision that was undone, of another program's run) is no answer to anything that was asked.
+        """
         key = self.keys.get(stage)
         if key is None:
             return None
         if self.results.has(stage, key):
             return key, True
-        entries = self.results.entries(stage)
-        return (entries[0].key, False) if entries else None
+        before = self.document.history.in_force_before(stage)
+        return next(((known, False) for known in before if self.results.has(stage, known)), None)
+
+    def was_in_force(self, stage: str, key: str) -> bool:
+        """Whether a result is, or was on the way to the session as it is now, the answer of its settings."""
+        if not self.document.is_open:
+            return False
+        return self.keys.get(stage) == key or key in self.document.history.in_force_before(stage)
 
     def failure(self, stage: str) -> Failure | None:
         """Why a stage failed with its settings as they are."""
@@ -172,7 +183,8 @@ class StageBoard:
         own = next(s for s in self.graph if s.name == stage)
         key, state = self.keys[stage], self.state(stage)
         entries = self.results.entries(stage)
-        shown = self.results.entry(stage, key) or (entries[0] if entries and state == "stale" else None)
+        drawn = self.latest(stage) if state in ("cached", "stale") else (key, True)
+        shown = None if drawn is None else self.results.entry(stage, drawn[0])
         failure = self.failure(stage)
         headline = (
             failure.sentence if failure and state == "failed" else str(shown.about.get("headline", "")) if shown else ""
@@ -222,10 +234,17 @@ class StageBoard:
         self._running = None
         if failure is not None:
             self._failures[Ref(failure.stage, failure.key)] = failure
+        self._note()
         self.changed.emit()
+
+    def land(self, ref: Ref, session: Session) -> None:
+        """A result is there that was computed for a session, which may have changed meanwhile."""
+        self.document.note_for(session, {ref.stage: ref.key})
+        self.end()
 
     def refresh(self) -> None:
         """Look again at the files the session was made from, and at the store."""
+        self._note()
         self._follow(False)
 
     def _follow(self, another: bool) -> None:
@@ -237,7 +256,13 @@ class StageBoard:
             self.results = Results(Store(folder / "results"), prepare=lambda ref, value: self.prepare(ref, value))
         if self.document.is_open:
             self._derive(self.document.session)
+            self._note()
         self.changed.emit()
+
+    def _note(self) -> None:
+        """Have the document remember the results that are in force, before or after anything of that changes."""
+        if self.document.is_open:
+            self.document.note({name: key for name, key in self.keys.items() if self.results.has(name, key)})
 
     def _derive(self, session: Session) -> None:
         self._said.clear()

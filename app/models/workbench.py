@@ -187,6 +187,9 @@ class Workbench:
         self._follow_sync()
         for stage in _DRAWN:
             latest = self.board.latest(stage)
+            before = self._shown.get(stage)
+            if before is not None and (latest is None or not self.board.was_in_force(stage, before)):
+                self._unshow(stage)
             if latest is None or self._shown.get(stage) == latest[0]:
                 continue
             if stage == "segment" or self.board.results.is_loaded(stage, latest[0]):
@@ -201,7 +204,9 @@ class Workbench:
         latest = self.board.latest("sync")
         if settings is not None and settings.offset is not None:
             self.clock.set_sync(settings.offset, settings.rate_ratio or 1.0)
-        elif latest is not None:
+        elif latest is None:
+            self.clock.set_sync(0.0)
+        else:
             try:
                 found = self.board.results.get("sync", latest[0])
             except Absent:
@@ -232,6 +237,15 @@ class Workbench:
             self._clusters = value.clusters
         else:
             self._bones = value.marker_joint
+        self.selection.set_groups(self._clusters, self._bones)
+
+    def _unshow(self, stage: str) -> None:
+        """Let go of a result that is no answer any more to anything that was asked."""
+        self._shown.pop(stage)
+        if stage == "segment":
+            self._clusters = None
+        elif stage == "fit":
+            self._bones = None
         self.selection.set_groups(self._clusters, self._bones)
 
     def _restore(self) -> None:

@@ -18,6 +18,8 @@ from solver.solve.results import Candidate, FittedMotion, Localization
 from solver.sync import Sync
 
 _SAME_TIME_S = 1e-6
+_BAND_M = 0.07
+"""Width of the stripes of a body that is out of date."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +60,20 @@ class BodyTrack:
     def skin(self) -> PosedPoints:
         """(U) the vertex below each marker."""
         return skin_points(self.body, self.betas, self.vertex)
+
+    @cached_property
+    def coarse_bands(self) -> np.ndarray:
+        """(V,) bool, of the coarse mesh: stripes across the body, fixed to the skin, for what is out of date."""
+        return self._bands("coarse")
+
+    @cached_property
+    def full_bands(self) -> np.ndarray:
+        """(V,) bool, the same of every vertex."""
+        return self._bands("full")
+
+    def _bands(self, detail: Detail) -> np.ndarray:
+        height = self.vertices(float(self.times[len(self.times) // 2]), detail)[:, 2]
+        return np.asarray(np.floor(height / _BAND_M).astype(int) % 2 == 1)
 
     def ready(self) -> BodyTrack:
         """Make every skin now and not when it is first drawn; the same track."""

@@ -13,6 +13,7 @@ from app.views.colours import bone_name
 from solver.body.skeleton import subtrees
 from solver.markers import Markers
 from solver.solve.confidence import same_answer
+from solver.solve.counting import candidate_number
 from solver.solve.paper.results import PaperLocalization
 from solver.solve.results import Localization, Orientation
 
@@ -74,6 +75,11 @@ class CandidateRow:
     same_as_first: bool = False
     in_use: bool = False
     can_pin: bool = False
+
+    @property
+    def number(self) -> int:
+        """The candidate's number, by which every other view calls it; 0 for one that has none."""
+        return candidate_number(self.candidate) if self.candidate >= 0 else 0
 
 
 @dataclass(frozen=True)

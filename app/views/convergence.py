@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.views.colours import RGB, rgb
+from solver.solve.counting import candidate_number
 from solver.solve.paper.results import Descent, PaperLocalization, PaperSolve, Trace
 from solver.solve.results import Candidate, Orientation
 from widgets import palette
@@ -54,7 +55,7 @@ def of_orientation(ranked: Orientation) -> tuple[EnergyCurve, ...]:
     return tuple(
         EnergyCurve(
             stage=TO_THE_END if own.refined else "first phases, then left behind",
-            label=f"{i + 1}: {own.part}, camera heading {degrees(own.heading_deg)}°",
+            label=f"{candidate_number(i)}: {own.part}, camera heading {degrees(own.heading_deg)}°",
             candidate=i,
             iteration=1 + np.arange(len(own.trace)),
             energy=np.array(own.trace, dtype=float),

@@ -8,6 +8,7 @@ import numpy as np
 
 from app.views.colours import RGB, rgb
 from solver.solve.confidence import same_answer
+from solver.solve.counting import candidate_number
 from solver.solve.paper.results import PaperSolve
 from solver.solve.results import Candidate, Orientation
 from widgets import palette
@@ -106,7 +107,7 @@ def hypotheses_picture(
         cards.append(
             HypothesisCard(
                 candidate=i,
-                title=own.part,
+                title=f"{candidate_number(i)}: {own.part}",
                 heading_deg=own.heading_deg,
                 start_deg=float("nan") if solved is None else solved.yaws[own.hypothesis].start_deg,
                 energy=own.energy,
@@ -120,7 +121,7 @@ def hypotheses_picture(
     highest = max((sum(term.value for term in card.terms) for card in cards), default=0.0)
     sentence = _sentence(ranked)
     if in_use is not None and in_use not in rows and in_use < len(ranked.candidates):
-        sentence += f" The fit goes on from candidate {in_use + 1}, which the search had left behind."
+        sentence += f" The fit goes on from candidate {candidate_number(in_use)}, which the search had left behind."
     return HypothesesPicture(tuple(cards), highest, sentence)
 
 
@@ -138,5 +139,5 @@ def _sentence(ranked: Orientation) -> str:
     sure = f"confidence {100 * ranked.confidence:.0f} %"
     if ranked.runner_up < 0 or not np.isfinite(ranked.margin):
         return f"No different answer was found; {sure}."
-    other = ranked.candidates[ranked.runner_up].part
+    other = f"{candidate_number(ranked.runner_up)}: {ranked.candidates[ranked.runner_up].part}"
     return f"The next different answer ({other}) costs {ranked.margin:.2f} times as much; {sure}."

@@ -96,24 +96,31 @@ def residual_row(
     markers: np.ndarray | None = None,
     ranks: Mapping[str, int] | None = None,
     also: Sequence[Curve] = (),
+    *,
+    own: str | None = None,
+    old: bool = False,
 ) -> CurveRow:
     """Distance of the markers from their places over time, a curve for each fit, mm.
 
     Parameters
     ----------
-    fits : by label; the first is the one in use, the others are compared with it
+    fits : by label
     time : (T,) s, the clock to lay them on; frames that a fit does not have are NaN
     statistic : over the markers of each frame
     markers : those that count; all where not given
     ranks : number of each fit's colour, so that it keeps it while others come and go
     also : further curves, mm
+    own : label of the one that the scene shows; the others are compared with it
+    old : whether that is out of date
     """
     curves = []
     for i, (label, motion) in enumerate(fits.items()):
         residual = motion.residual if markers is None else motion.residual[:, markers]
         values = 1000 * on_clock(time, motion.time, over_markers(residual, statistic))
         rank = i if ranks is None else ranks[label]
-        curves.append(Curve(label, values, palette.categorical(rank + 1)[rank], dashed=i > 0))
+        curves.append(
+            Curve(label, values, palette.categorical(rank + 1)[rank], dashed=label != own, old=label == own and old)
+        )
     curves += also
     whose = "all markers" if markers is None else f"{len(markers)} selected marker{'s' if len(markers) != 1 else ''}"
     return CurveRow(

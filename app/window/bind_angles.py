@@ -25,6 +25,7 @@ class AnglesBinder:
         self._filling = QTimer(widget, singleShot=True, interval=0)  # after the scene, so that neither waits for both
         self._filling.timeout.connect(self._fill)
         shown.changed.connect(self._changed)
+        shown.dated.connect(self._changed)
         bench.opened.connect(self._opened)
         bench.document.changed.connect(lambda another: self._conventions())
         bench.clock.moved.connect(widget.set_time)
@@ -56,8 +57,8 @@ class AnglesBinder:
         picture = self.shown.once(
             "angle curves", (angles, bones, reference), lambda: angles_picture(angles, bones, reference)
         )
-        before = self.widget.shown()
-        self.widget.set_curves(picture.time, picture.plots, picture.convention, picture.zero_pose, said, missing)
+        before, old = self.widget.shown(), self.shown.stale("angles")
+        self.widget.set_curves(picture.time, picture.plots, picture.convention, picture.zero_pose, said, missing, old)
         known = self.bench.document.view.get("angles")
         titles = {plot.title for plot in picture.plots}
         if not before and isinstance(known, list) and titles & set(known):

@@ -6,7 +6,7 @@ from PySide6.QtCore import QTimer
 
 from app.models import edits
 from app.models.fits import CANDIDATE_COLOURS
-from app.models.workbench import Workbench
+from app.models.workbench import Said, Workbench
 from app.views.candidates import CandidateTable as Table
 from app.views.candidates import candidate_table, covered_by
 from app.views.running import candidates_so_far
@@ -29,6 +29,7 @@ class CandidatesBinder:
         self._filling = QTimer(widget, singleShot=True, interval=0)  # after the scene: a picture waits for no table
         self._filling.timeout.connect(self.fill)
         shown.changed.connect(self._changed)
+        shown.dated.connect(lambda stages: self.fill())
         bench.document.changed.connect(lambda another: self.fill())
         bench.runner.found.connect(self._found)
         bench.runner.changed.connect(self.fill)
@@ -128,6 +129,11 @@ class CandidatesBinder:
         self.widget.set_selected(place)
 
     def _pin(self, row: int) -> None:
+        if self.shown.stale("orient"):
+            self.bench.say(
+                Said("note", "These candidates are out of date", "pinning", "run the stage Orientation first")
+            )
+            return
         if self._table is None or not 0 <= row < len(self._table.rows):
             return
         own = self._table.rows[row]

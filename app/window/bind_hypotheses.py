@@ -7,7 +7,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtGui import QImage
 
 from app.models import edits
-from app.models.workbench import Workbench
+from app.models.workbench import Said, Workbench
 from app.views.hypotheses import HypothesesPicture, hypotheses_picture
 from app.views.posing import BONE_EDGES
 from app.window.ghosts import Ghosts
@@ -33,6 +33,7 @@ class HypothesesBinder:
         self._timer = QTimer(widget, interval=0)
         self._timer.timeout.connect(self._draw_next)
         shown.changed.connect(self._changed)
+        shown.dated.connect(lambda stages: self.fill())
         bench.document.changed.connect(lambda another: self.fill())
         bench.selection.changed.connect(lambda what: self._select())
         widget.hypothesis_selected.connect(lambda row: bench.selection.select(candidate=row, hypothesis=None))
@@ -69,6 +70,11 @@ class HypothesesBinder:
         self.widget.set_selected(-1 if row is None else row)
 
     def _pin(self, row: int) -> None:
+        if self.shown.stale("orient"):
+            self.bench.say(
+                Said("note", "These candidates are out of date", "pinning", "run the stage Orientation first")
+            )
+            return
         document = self.bench.document
         self.bench.attempt(lambda: document.apply(edits.pin_candidate(document.session, row)))
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from PySide6.QtCore import Qt
 
+from app.models.fields import title
 from app.models.workbench import Said, Workbench
 from app.views import scene
 from app.views.bodies import BodyTrack
@@ -22,6 +23,10 @@ from widgets.scene import Legend as Drawn
 _NONE = np.zeros((0, 3))
 TROUBLE_REMEDY = "all else works on; save the session, and open it again if it does not come back by itself"
 """What to do where a view cannot be drawn."""
+OUT_OF_DATE = "Out of date"
+_OLD_BONE: RGB = (128, 128, 128)
+_COLOURED = {"cluster": "segment", "bone": "fit", "residual": "fit"}
+"""The stage that the colours of the markers come from."""
 
 
 class SceneBinder:
@@ -38,7 +43,7 @@ class SceneBinder:
         self._framed = False
         self._own_view: dict[str, Any] | None = None
         self._body: tuple[object, ...] | None = None
-        self._legend: tuple[Legend, tuple[tuple[str, RGB], ...]] | None = None
+        self._legend: tuple[object, ...] | None = None
         self._ghost_layers: set[str] = set()
         bench.clock.moved.connect(lambda time: self.draw())
         bench.clock.changed.connect(self.draw)
@@ -46,6 +51,7 @@ class SceneBinder:
         bench.selection.changed.connect(lambda what: self.draw())
         bench.opened.connect(self._opened)
         shown.changed.connect(self._changed)
+        shown.dated.connect(lambda stages: self.draw())
         ghosts.changed.connect(self.draw)
         widget.marker_clicked.connect(lambda marker, held: bench.selection.select_markers([marker], how(held)))
         widget.markers_boxed.connect(lambda markers, held: bench.selection.select_markers(markers, _box_how(held)))
@@ -76,7 +82,7 @@ class SceneBinder:
         widget.set_markers(drawn.positions if layers["markers"] else drawn.positions * np.nan, drawn.coloured.colours)
         widget.set_selected(bench.selection.markers)
         widget.set_trails(scene.trails(tracks, frame, display.trail_s) if layers["trails"] else None)
-        self._say(drawn.coloured.legend)
+        self._say(drawn.coloured.legend, self._old())
         self._draw_body(frame, time)
         self._draw_ghosts(time)
         widget.follow_point(scene.middle(tracks, frame))
@@ -90,7 +96,7 @@ class SceneBinder:
             self._clear_body()
         else:
             assert track is not None
-            self._show_body(track, time, display.opacity)
+            self._show_body(track, time, display.opacity, self.shown.stale("fit"))
         joints = None if hidden or not display.layers["skeleton"] else track.joints(time)  # type: ignore[union-attr]
         widget.set_bones("skeleton", joints, BONE_EDGES, self._bone_colours())
         if hidden or not display.layers["links"]:
@@ -100,14 +106,21 @@ class SceneBinder:
             lines = scene.ties(tracks, track, frame)
             widget.set_lines("links", lines.start, lines.end)
 
-    def _show_body(self, track: BodyTrack, time: float, opacity: float) -> None:
-        """The coarse mesh, and every vertex as soon as the clock rests; as it is where it is this body already."""
-        wanted = track, time, opacity, theme.colours()
+    def _show_body(self, track: BodyTrack, time: float, opacity: float, old: bool) -> None:
+        """The coarse mesh, and every vertex as soon as the clock rests; as it is where it is this body already.
+
+        One that is out of date is striped.
+        """
+        wanted = track, time, opacity, theme.colours(), old
         if self._body is None or any(a is not b and a != b for a, b in zip(wanted, self._body)):
             self._body = wanted
             self.widget.set_mesh(
-                "body", track.vertices(time, "coarse"), track.faces("coarse"), opacity=opacity,
-                finer=lambda: (track.vertices(time, "full"), track.faces("full")),
+                "body", track.vertices(time, "coarse"), track.faces("coarse"),
+                _striped(track.coarse_bands) if old else None, opacity,
+                finer=lambda: (
+                    track.vertices(time, "full"), track.faces("full"),
+                    _striped(track.full_bands) if old else np.array(theme.colours().body),
+                ),
             )  # fmt: skip
 
     def _clear_body(self) -> None:
@@ -115,12 +128,26 @@ class SceneBinder:
         self.widget.set_mesh("body", None, _NONE)
 
     def _bone_colours(self) -> Any:
-        bone = self.bench.selection.bone
-        if bone is None:
+        bone, old, look = self.bench.selection.bone, self.shown.stale("fit"), theme.colours()
+        if bone is None and not old:
             return None
-        colours = np.tile(np.array(theme.colours().bone, dtype=np.uint8), (len(BONE_EDGES), 1))
-        colours[BONE_EDGES[:, 0] == bone] = palette.SELECTED
+        colours = np.tile(np.array(_OLD_BONE if old else look.bone, dtype=np.uint8), (len(BONE_EDGES), 1))
+        if bone is not None:
+            colours[BONE_EDGES[:, 0] == bone] = palette.SELECTED
         return colours
+
+    def _old(self) -> tuple[tuple[str, RGB], ...]:
+        """What is drawn of results that are out of date, in words with a colour, for the legend."""
+        layers, found = self.bench.display.layers, []
+        body = any(layers[name] for name in ("body", "skeleton", "links")) and not self.ghosts.replaces_body
+        if body and self.shown.out_of_date(("fit",)):
+            found.append(("Body, striped", theme.colours().warning))
+        stage = _COLOURED.get(self.bench.display.colour_by, "")
+        if layers["markers"] and self.clusters is None and self.shown.out_of_date((stage,)):
+            found.append((f"Colours: {title(stage)}", _OLD_BONE))
+        if layers["markers"] and (old := self.shown.out_of_date(("markers", "clean"))):
+            found.append((f"Markers: {title(old[-1])}", _OLD_BONE))
+        return tuple(found)
 
     def _draw_ghosts(self, time: float) -> None:
         here = {f"ghost {ghost.name}": ghost for ghost in self.ghosts.all} if self._ghosts_on() else {}
@@ -136,16 +163,17 @@ class SceneBinder:
     def _ghosts_on(self) -> bool:
         return self.bench.display.layers["ghosts"] or self.ghosts.replaces_body
 
-    def _say(self, legend: Legend) -> None:
+    def _say(self, legend: Legend, old: tuple[tuple[str, RGB], ...]) -> None:
         ghosts = tuple((ghost.title, ghost.colour) for ghost in self.ghosts.all) if self._ghosts_on() else ()
-        if (legend, ghosts) == self._legend:
+        if (legend, ghosts, old) == self._legend:
             return
-        self._legend = legend, ghosts
+        self._legend = legend, ghosts, old
+        others = Drawn("Ghosts", ghosts) if ghosts else None
         scale = legend.scale
         self.widget.set_legend(
             legend.title,
             legend.entries if scale is None else ColourBar(scale.lo, scale.hi, scale.unit, scale.name),
-            Drawn("Ghosts", ghosts) if ghosts else None,
+            Drawn(OUT_OF_DATE, old, others) if old else others,
         )
 
     def _clear(self) -> None:
@@ -226,3 +254,9 @@ def _held(held: Qt.KeyboardModifier) -> bool:
 def _box_how(held: Qt.KeyboardModifier) -> Any:
     """Shift draws the box, so it alone replaces; with Ctrl it adds."""
     return "add" if held & Qt.KeyboardModifier.ControlModifier else "replace"
+
+
+def _striped(bands: np.ndarray) -> np.ndarray:
+    """(V, 3) uint8 of a body that is out of date: stripes of its colour and of a warning's."""
+    look = theme.colours()
+    return np.where(bands[:, None], np.array(look.warning), np.array(look.body)).astype(np.uint8)

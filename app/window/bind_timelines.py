@@ -16,6 +16,7 @@ from app.window.ghosts import Ghosts
 from app.window.keys import how
 from app.window.residual_menu import ResidualMenu
 from app.window.shown import Shown
+from solver.solve.counting import candidate_number
 from solver.sync import Sync
 from widgets import palette
 from widgets.plots.rows import Curve, CurveRow, Row
@@ -45,6 +46,7 @@ class TimelinesBinder:
         self.fits.changed.connect(lambda: self._filling.start())
         bench.opened.connect(self._opened)
         shown.changed.connect(self._changed)
+        shown.dated.connect(lambda stages: self._filling.start())
         widget.seeked.connect(bench.clock.seek)
         widget.range_changed.connect(bench.clock.set_loop)
         widget.offset_dragged.connect(lambda offset: bench.clock.set_sync(offset, bench.clock.timing.rate_ratio))
@@ -131,21 +133,23 @@ class TimelinesBinder:
     def _residual(self) -> CurveRow | None:
         """Every fit that is in the store and not hidden, the one shown in the scene first, and the chosen candidate."""
         shown, display, board = self.shown, self.bench.display, self.bench.board
-        tracks, motion = shown.tracks, shown.fit
+        tracks, motion = shown.tracks, shown.get("fit")
         assert tracks is not None
-        latest = board.latest("fit")
         chosen = self._chosen()
         fits: dict[str, views.Residuals] = {}
         ranks: dict[str, int] = {}
-        if motion is not None and (latest is None or latest[0] not in display.hidden_fits):
-            name = "fit (stale)" if shown.stale("fit") else "fit in force"
-            fits[name], ranks[name] = motion, 0
+        own, old = None, shown.stale("fit")
+        if motion is not None and shown.key("fit") not in display.hidden_fits:
+            own = "fit, out of date" if old else "fit in force"
+            fits[own], ranks[own] = motion, 0
         for key, place in colour_places(board).items():
             residual = self.fits.known.get(key)
             if residual is None:
                 continue
-            if key in display.hidden_fits or (
-                chosen is not None and residual.residual.shape[1] <= chosen.max(initial=-1)
+            if (
+                key in display.hidden_fits
+                or key == shown.key("fit")
+                or (chosen is not None and residual.residual.shape[1] <= chosen.max(initial=-1))
             ):
                 continue
             said = self.fits.said(key)
@@ -155,12 +159,19 @@ class TimelinesBinder:
         also = self._candidate(chosen)
         if not fits and also is None:
             return None
-        asked = self._same("row", (display.residual, None if chosen is None else chosen.tolist(), list(fits)))
+        asked = self._same("row", (display.residual, None if chosen is None else chosen.tolist(), list(fits), own, old))
         made = shown.once(
             "residual",
             (*fits.values(), tracks, also, asked),
             lambda: views.residual_row(
-                fits, tracks.markers.time, display.residual, chosen, ranks, () if also is None else (also,)
+                fits,
+                tracks.markers.time,
+                display.residual,
+                chosen,
+                ranks,
+                () if also is None else (also,),
+                own=own,
+                old=old,
             ),
         )
         return cast(CurveRow, made)
@@ -181,23 +192,23 @@ class TimelinesBinder:
         if row is None or track is None or markers is None:
             return None
         statistic = self.bench.display.residual
-        asked = self._same("candidate", (row, statistic, None if chosen is None else chosen.tolist()))
+        label = f"candidate {candidate_number(row)}{', out of date' if self.shown.stale('orient') else ''}"
+        asked = self._same("candidate", (label, statistic, None if chosen is None else chosen.tolist()))
         made = self.shown.once(
             "residual of the candidate",
             (track, markers, asked),
-            lambda: views.candidate_curve(
-                track, markers, f"candidate {row + 1}", palette.categorical(12)[row % 12], statistic, chosen
-            ),
+            lambda: views.candidate_curve(track, markers, label, palette.categorical(12)[row % 12], statistic, chosen),
         )
         return cast(Curve, made)
 
     def _found_offset(self) -> Sync | None:
-        """An earlier result that looked for the offset by itself, None where there is none."""
-        results = self.bench.board.results
-        for entry in results.entries("sync"):
-            value: Sync = results.get("sync", entry.key)
-            if value.method != "given":
-                return value
+        """The result that looked for the offset by itself and was in force last, None where there is none."""
+        board, results = self.bench.board, self.bench.board.results
+        for key in dict.fromkeys((board.keys.get("sync", ""), *self.bench.document.history.in_force_before("sync"))):
+            if results.has("sync", key):
+                value: Sync = results.get("sync", key)
+                if value.method != "given":
+                    return value
         return None
 
     def _clicked(self, row: str, time: float, index: int) -> None:

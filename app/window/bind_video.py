@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.models.fields import title
 from app.models.frames import VideoFrame
 from app.models.workbench import Said, Workbench
 from app.views import scene, video
@@ -15,6 +16,11 @@ from app.window.keys import how
 from app.window.shown import Shown
 from solver.sync import Sync
 from widgets.video import VideoView
+
+_BODY, _BONES, _OLD = (86, 180, 233), (255, 255, 255), (150, 150, 150)
+"""Colours of the projected body and its bones, and of both where the fit is out of date."""
+_OLD_SHARE = 0.4
+"""How strong landmarks are drawn that are out of date."""
 
 
 class VideoBinder:
@@ -29,6 +35,7 @@ class VideoBinder:
         bench.selection.changed.connect(lambda what: self.draw())
         bench.opened.connect(self._opened)
         shown.changed.connect(lambda stages: self.draw())
+        shown.dated.connect(lambda stages: self.draw())
         widget.marker_clicked.connect(lambda marker, held: bench.selection.select_markers([marker], how(held)))
         widget.trouble.connect(lambda text: bench.say(Said("error", text, remedy=TROUBLE_REMEDY)))
 
@@ -51,9 +58,18 @@ class VideoBinder:
                 self.widget.set_frame(None, f"Reading the video: {100 * frames.part:.0f} %")
             return
         count = len(frames.times)
-        which = "" if frame.number is None else f"frame {frame.number} of {count}   "
-        self.widget.set_frame(frame.picture, f"{which}{frame.time:.3f} s")
+        which = "" if frame.number is None else f"frame {frame.number} / {count - 1}   "
+        old = ", ".join(title(stage) for stage in self._old())
+        self.widget.set_frame(frame.picture, f"{which}{frame.time:.3f} s{f'   out of date: {old}' if old else ''}")
         self._overlays(frame)
+
+    def _old(self) -> tuple[str, ...]:
+        """The stages that are drawn over the picture and are out of date."""
+        layers = self.bench.display.layers
+        drawn = [*(["landmarks"] if layers["landmarks"] else [])]
+        if layers["projected"] and self.shown.get("fit") is not None:
+            drawn += ["markers", "clean", "sync", "fit"]
+        return self.shown.out_of_date(drawn)
 
     def _overlays(self, frame: VideoFrame | None) -> None:
         self._landmarks(frame)
@@ -69,7 +85,8 @@ class VideoBinder:
             number = int(self.bench.clock.video_frame or 0)
         found = video.landmarks_at(seen, number, frame.time)
         scale = frame.picture.shape[1] / seen.image_size[0] if seen.image_size[0] else 1.0
-        self.widget.set_landmarks(found.px * scale, video.LANDMARK_EDGES, found.visibility)
+        sure = (_OLD_SHARE if self.shown.stale("landmarks") else 1.0) * found.visibility
+        self.widget.set_landmarks(found.px * scale, video.LANDMARK_EDGES, sure)
 
     def _projected(self, frame: VideoFrame | None) -> None:
         motion, sync, tracks = self.shown.get("fit"), self.shown.get("sync"), self.shown.tracks
@@ -91,8 +108,9 @@ class VideoBinder:
         layers = self.bench.display.layers
         self.widget.set_markers(found.markers * scale if layers["markers"] else None, coloured.colours)
         self.widget.set_selected(self.bench.selection.markers)
-        self.widget.set_body(found.body * scale if layers["body"] else None, found.faces)
-        self.widget.set_skeleton(found.joints * scale if layers["skeleton"] else None, found.bones)
+        body, bones = (_OLD, _OLD) if self.shown.stale("fit") else (_BODY, _BONES)
+        self.widget.set_body(found.body * scale if layers["body"] else None, found.faces, body)
+        self.widget.set_skeleton(found.joints * scale if layers["skeleton"] else None, found.bones, bones)
 
     def _in_force(self, sync: Sync) -> Sync:
         """The sync that the clock goes by: the user's offset while it is dragged."""

@@ -73,8 +73,8 @@ def report_pictures(window: MainWindow) -> list[Any]:
     if window.bench.frames is not None:
         found.append(Picture("Markers and body projected into the video", png_of(window.video.image())))
     views: list[tuple[str, QWidget]] = [
-        ("The session along its clock: presence of every marker, residual, video", window.timelines),
-        ("Which markers move rigidly together", window.affinity),
+        ("The session along its clock: presence of every marker, residual, video", window.dated["timelines"]),
+        ("Which markers move rigidly together", window.dated["affinity"]),
     ]
     found += [Picture(words, png_of(view.grab().toImage())) for words, view in views if view.width() > 100]
     return found

@@ -16,6 +16,7 @@ from app.views.candidates import part_of_bones
 from app.views.colours import RGB, rgb
 from app.views.convergence import EnergyCurve
 from app.window.shown import Shown
+from solver.solve.counting import candidate_number
 from solver.solve.results import Localization
 from widgets import palette
 
@@ -55,6 +56,7 @@ class Ghosts:
         self.replaces_body = False
         self._iteration: tuple[EnergyCurve, int] | None = None
         shown.changed.connect(self._results)
+        shown.dated.connect(lambda stages: self._make())
         bench.selection.changed.connect(self._selected)
 
     def show_iteration(self, curve: EnergyCurve | None, step: int = 0) -> None:
@@ -86,10 +88,10 @@ class Ghosts:
             name = f"compared {ref.key}"
             track = self.shown.once(name, (motion,), partial(bodies.of_motion, self.shown.body, motion))
             found.append(Ghost(name, self._said(ref.key), track, rgb(palette.categorical(place + 1)[place])))
-        before = [ghost.name for ghost in self.all], [ghost.track for ghost in self.all]
+        before = [(ghost.name, ghost.title, ghost.track) for ghost in self.all]
         self.replaces_body = own is not None and self._iteration is not None
         self.all = tuple(found)
-        if before != ([ghost.name for ghost in found], [ghost.track for ghost in found]):
+        if before != [(ghost.name, ghost.title, ghost.track) for ghost in found]:
             self.changed.emit()
 
     def _said(self, key: str) -> str:
@@ -105,13 +107,19 @@ class Ghosts:
             return None
         vertex = curve.vertex if curve.vertex is not None else np.zeros(0, dtype=np.intp)
         track = bodies.of_iteration(self.shown.body, curve.trace, step, found, markers, vertex)
-        return Ghost("iteration", f"Iteration of {curve.label}", track, curve.colour, 0.75)
+        title = f"Iteration of {curve.label}{self._dated('localize', 'orient', 'solve')}"
+        return Ghost("iteration", title, track, curve.colour, 0.75)
+
+    def _dated(self, *stages: str) -> str:
+        """What to add to the title of a ghost that comes from these stages."""
+        return ", out of date" if self.shown.out_of_date(stages) else ""
 
     def _of_selection(self) -> Ghost | None:
         track = self.candidate_track()
         if track is not None:
             chosen = self.bench.selection.candidate or 0
-            title = f"Candidate {chosen + 1}: {self.shown.get('orient').candidates[chosen].part}"
+            title = f"Candidate {candidate_number(chosen)}: {self.shown.get('orient').candidates[chosen].part}"
+            title += self._dated("localize", "orient")
             return Ghost("candidate", title, track, _colour(chosen))
         found, prior, sync = (self.shown.get(name) for name in ("localize", "prior", "sync"))
         row, markers = self.bench.selection.hypothesis, self.shown.markers
@@ -127,7 +135,8 @@ class Ghosts:
                 return None
             bones = found.candidates[row].bones
             track = bodies.of_chain(self.shown.body, found, row, prior, sync, markers)
-        return Ghost("hypothesis", f"Hypothesis: {part_of_bones(bones)}", track, _colour(row))
+        title = f"Hypothesis: {part_of_bones(bones)}{self._dated('localize', 'prior', 'sync')}"
+        return Ghost("hypothesis", title, track, _colour(row))
 
     def candidate_track(self, row: int | None = None) -> BodyTrack | None:
         """The body of a candidate, the selected one by default."""

@@ -19,6 +19,7 @@ from app.window.bind_affinity import AffinityBinder
 from app.window.bind_angles import AnglesBinder
 from app.window.bind_candidates import CandidatesBinder
 from app.window.bind_convergence import ConvergenceBinder
+from app.window.bind_dated import DatedBinder
 from app.window.bind_history import HistoryBinder
 from app.window.bind_hypotheses import HypothesesBinder
 from app.window.bind_markers import MarkersBinder
@@ -37,6 +38,7 @@ from app.window.group_menu import SceneMenu
 from app.window.keys import wants
 from app.window.remembering import parts_of, restore
 from app.window.shown import Shown
+from widgets.panels.dated import Dated
 from widgets.panels.history import HistoryList
 from widgets.panels.hypotheses import HypothesesView
 from widgets.panels.message_bar import MessageBar
@@ -116,19 +118,30 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(_column(self.messages, self.pages))
         self.statusBar().addPermanentWidget(self.progress, 1)
         self.statusBar().setSizeGripEnabled(False)
+        self.dated = {
+            "video": Dated(self.video),
+            "affinity": Dated(_column(self.affinity, self.pair)),
+            "candidates": Dated(self.candidates),
+            "hypotheses": Dated(self.hypotheses),
+            "convergence": Dated(self.convergence),
+            "markers": Dated(self.markers),
+            "timelines": Dated(self.timelines),
+            "angles": Dated(self.angles),
+        }
+        dated = self.dated
         self.docks = Docks(
             self,
             [
                 Panel("stages", "Stages", self.stages, _LEFT, "Every stage: its state, settings and results"),
                 Panel("history", "History", self.history, _LEFT, "Every decision, to go back to"),
-                Panel("video", "Video", self.video, _RIGHT, "The frame of the clock's time"),
-                Panel("affinity", "Affinity", _column(self.affinity, self.pair), _RIGHT, "Who moves rigidly with whom"),
-                Panel("candidates", "Candidates", self.candidates, _RIGHT, "Where on the body the markers may sit"),
-                Panel("hypotheses", "Hypotheses", self.hypotheses, _RIGHT, "The answers side by side"),
-                Panel("convergence", "Convergence", self.convergence, _RIGHT, "How the energies fell"),
-                Panel("markers", "Markers", self.markers, _RIGHT, "Every marker with its gaps and residuals"),
-                Panel("timelines", "Timelines", self.timelines, _BOTTOM, "All streams along the clock"),
-                Panel("angles", "Angles", self.angles, _BOTTOM, "Joint angles, left and right"),
+                Panel("video", "Video", dated["video"], _RIGHT, "The frame of the clock's time"),
+                Panel("affinity", "Affinity", dated["affinity"], _RIGHT, "Who moves rigidly with whom"),
+                Panel("candidates", "Candidates", dated["candidates"], _RIGHT, "Where on the body the markers may sit"),
+                Panel("hypotheses", "Hypotheses", dated["hypotheses"], _RIGHT, "The answers side by side"),
+                Panel("convergence", "Convergence", dated["convergence"], _RIGHT, "How the energies fell"),
+                Panel("markers", "Markers", dated["markers"], _RIGHT, "Every marker with its gaps and residuals"),
+                Panel("timelines", "Timelines", dated["timelines"], _BOTTOM, "All streams along the clock"),
+                Panel("angles", "Angles", dated["angles"], _BOTTOM, "Joint angles, left and right"),
             ],
         )
 
@@ -151,6 +164,7 @@ class MainWindow(QMainWindow):
             MarkersBinder(self.markers, bench, shown),
             AnglesBinder(self.angles, bench, shown, self.table),
             HistoryBinder(self.history, bench),
+            DatedBinder(self.dated, shown),
             WelcomeBinder(self.welcome, bench, self.table, self.open_path, self.drop),
         ]
 

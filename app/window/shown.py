@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,16 +29,19 @@ _ON_THE_BODY = ("localize", "solve", "orient", "fit")
 
 
 class Shown:
-    """The latest result of every stage, stale or not, as soon as it is in memory.
+    """What there is to draw of every stage, in force or out of date, as soon as it is in memory.
 
     Attributes
     ----------
     changed : emitted with the names of the stages whose result is another, and "compared" where that list is
+    dated : emitted with the names of the stages whose result is the same, but has gone out of date or is in force again
     """
 
     def __init__(self, bench: Workbench) -> None:
         self.changed: Signal[[frozenset[str]]] = Signal()
+        self.dated: Signal[[frozenset[str]]] = Signal()
         self.bench = bench
+        self._old: frozenset[str] = frozenset()
         self._refs: dict[str, Ref] = {}
         self._values: dict[str, Any] = {}
         self._compared: dict[Ref, Any] = {}
@@ -55,7 +58,7 @@ class Shown:
         if another:
             gone = frozenset(self._refs)
             self._refs, self._values, self._compared, self._made = {}, {}, {}, {}
-            self._posed = None
+            self._posed, self._old = None, frozenset()
             self.changed.emit(gone)
             if self.bench.document.is_open:
                 self._load_body_ahead()
@@ -71,9 +74,15 @@ class Shown:
                 if self._refs.pop(stage, None) is not None:
                     self._values.pop(stage, None)
                     changed.add(stage)
-            elif self._refs.get(stage) != ref and self._has(ref):
-                self._refs[stage], self._values[stage] = ref, board.results.get(stage, ref.key)
-                changed.add(stage)
+            elif self._refs.get(stage) != ref:
+                before = self._refs.get(stage)
+                if self._has(ref):
+                    self._refs[stage], self._values[stage] = ref, board.results.get(stage, ref.key)
+                    changed.add(stage)
+                elif before is not None and not board.was_in_force(stage, before.key):
+                    # Of a decision that was undone: not even for the moment that the other takes to be loaded.
+                    del self._refs[stage], self._values[stage]
+                    changed.add(stage)
         fits = {ref for ref in board.compared if ref.stage in ("fit", "angles")}
         for gone in self._compared.keys() - fits:
             del self._compared[gone]
@@ -82,8 +91,12 @@ class Shown:
             if self._has(ref):
                 self._compared[ref] = board.results.get(ref.stage, ref.key)
                 changed.add("compared")
+        old = frozenset(stage for stage in self._refs if self.stale(stage))
+        turned, self._old = (old ^ self._old) - changed, old
         if changed:
             self.changed.emit(frozenset(changed))
+        if turned:
+            self.dated.emit(turned)
 
     def _has(self, ref: Ref) -> bool:
         results = self.bench.board.results
@@ -97,7 +110,7 @@ class Shown:
         self.follow()
 
     def get(self, stage: str) -> Any:
-        """A stage's latest result, None where there is none (yet), or only one of other markers than there are now."""
+        """What is shown of a stage, None where there is nothing (yet), or only of other markers than there are now."""
         value = self._values.get(stage)
         if value is None or not self._of_these_markers(stage, value):
             return None
@@ -129,6 +142,15 @@ class Shown:
         """Whether what is shown of a stage is not what the settings ask for."""
         ref = self._refs.get(stage)
         return ref is not None and self.bench.board.keys.get(stage) != ref.key
+
+    def key(self, stage: str) -> str | None:
+        """Key of what is shown of a stage."""
+        ref = self._refs.get(stage)
+        return None if ref is None else ref.key
+
+    def out_of_date(self, stages: Iterable[str]) -> tuple[str, ...]:
+        """Those of some stages that are shown, and are not what the settings ask for."""
+        return tuple(stage for stage in stages if self.stale(stage) and self.get(stage) is not None)
 
     def compared(self, stage: str) -> dict[Ref, Any]:
         """Results that are shown beside the one in force."""

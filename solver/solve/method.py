@@ -13,6 +13,7 @@ from solver.localize import Hypothesis, Search, hypotheses
 from solver.progress import Progress, silent
 from solver.rotations import log_so3
 from solver.solve.bundle import FINE, Fit, descend, relax
+from solver.solve.counting import candidate_number
 from solver.solve.ending import motion_from
 from solver.solve.kinematics import Points, Pose, forward, place_points
 from solver.solve.placement import Skin
@@ -175,8 +176,11 @@ def chosen_row(ranked: Orientation, settings: FitSettings) -> int:
     """
     row = 0 if settings.candidate is None else settings.candidate
     if not 0 <= row < len(ranked.candidates):
+        last = len(ranked.candidates) - 1
         raise InputError(
-            f"is {row}", "the pinned candidate", f"pin one of the {len(ranked.candidates)} candidates, counted from 0"
+            f"is number {candidate_number(row)}, which is not there",
+            "the pinned candidate",
+            f"pin one of 1 to {candidate_number(last)} (in session.toml, candidate = 0 to {last})",
         )
     return row
 
@@ -211,7 +215,7 @@ def fitted_motion(
         camera=_written(state.camera, camera.image_size, camera.reprojection_px),
         chosen=row,
         confidence=1.0 if pinned else ranked.confidence,
-        warnings=(f"Candidate {row} was pinned by hand.",) if pinned else ranked.warnings,
+        warnings=(f"Candidate {candidate_number(row)} was pinned by hand.",) if pinned else ranked.warnings,
     )
 
 

@@ -25,6 +25,8 @@ from widgets.panels.fields import SettingsForm
 from widgets.panels.stage_data import MEANING, EarlierResult, StageData, StageProgress, duration, left
 from widgets.theme import colours
 
+_WORDS = {"stale": "out of date"}
+"""What a state is called where that is another word."""
 _LOOK = {
     "not run": ("not_run", "faint"),
     "cached": ("cached", "good"),
@@ -136,10 +138,10 @@ class StageCard(QFrame):
                 self.form.set_fields(data.fields)  # a value that was not taken gives way to the one in force
             return
         self._data = self._shown = data
-        self.setAccessibleName(f"{data.title}: {data.state}")
+        self.setAccessibleName(f"{data.title}: {_WORDS.get(data.state, data.state)}")
         self._title.setText(data.title)
         self._title.setToolTip(data.help)
-        self._state.setText(data.state)
+        self._state.setText(_WORDS.get(data.state, data.state))
         self._state.setToolTip(MEANING[data.state])
         self._seconds.setText("" if data.seconds is None else duration(data.seconds))
         self._seconds.setToolTip("How long it took to compute")

@@ -17,6 +17,7 @@ from widgets.plots.rows import Curve
 from widgets.plots.scales import Scale, clock, limits, number, time_ticks
 from widgets.theme import colours
 
+OUT_OF_DATE = "out of date"
 _COLUMN_EM = 34.0
 """Lines of text that a column of plots is wide before there are two."""
 
@@ -39,6 +40,7 @@ class AnglePlots(QWidget):
         self._view = (0.0, 1.0)
         self._cursor = 0.0
         self._joint: str | None = None
+        self._old = False
         self._picture: QPixmap | None = None
 
     def set_joint(self, joint: str | None) -> None:
@@ -47,8 +49,9 @@ class AnglePlots(QWidget):
             self._joint = joint
             self.update()
 
-    def set_plots(self, time: np.ndarray, plots: Sequence[Any], view: tuple[float, float]) -> None:
-        """Show these, see :class:`AnglePlot`, over the part ``view`` of the clock, s."""
+    def set_plots(self, time: np.ndarray, plots: Sequence[Any], view: tuple[float, float], old: bool = False) -> None:
+        """Show these, see :class:`AnglePlot`, over the part ``view`` of the clock, s; pale where they are ``old``."""
+        self._old = old
         self._time, self._plots, self._view = time, tuple(plots), view
         self._picture = None
         self._fit()
@@ -159,11 +162,11 @@ class AnglePlots(QWidget):
         areas, columns = self.areas(), self.columns()
         for k, (plot, area) in enumerate(zip(self._plots, areas)):
             painter.fillRect(area, colour(look.base))
-            painter.setPen(colour(look.text))
+            painter.setPen(colour(look.warning if self._old else look.text))
             metrics = QFontMetricsF(self.font())
             beside = len(plot.curves) * (metrics.horizontalAdvance("L −000.0°") + 24)
             room = QRectF(area.left(), area.top() - 1.2 * line, max(area.width() - beside, 40), 1.1 * line)
-            elided(painter, room, plot.title)
+            elided(painter, room, f"{plot.title}, {OUT_OF_DATE}" if self._old else plot.title)
             low, high = limits(
                 [c.degrees for c in plot.curves] + [c.reference for c in plot.curves if c.reference is not None]
             )
@@ -179,7 +182,8 @@ class AnglePlots(QWidget):
                 ink = np.array(curve.colour, np.uint8)
                 if curve.reference is not None:
                     draw_curve(painter, area, x, y, Curve("", curve.reference, ink, dashed=True), self._time)
-                draw_curve(painter, area, x, y, Curve(curve.name, curve.degrees, ink), self._time)
+                own = Curve(curve.name, curve.degrees, ink, old=self._old)
+                draw_curve(painter, area, x, y, own, self._time)
             painter.setClipping(False)
             if k + columns >= len(areas):
                 self._draw_clock(painter, area, x)

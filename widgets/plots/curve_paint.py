@@ -9,7 +9,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QFontMetricsF, QPainter
 
 from widgets.plots.decimate import envelope
-from widgets.plots.ink import colour, legible, pen, polyline
+from widgets.plots.ink import colour, faded, legible, pen, polyline
 from widgets.plots.rows import Curve
 from widgets.plots.scales import Scale
 from widgets.theme import colours
@@ -31,13 +31,18 @@ def curve_value(curve: Curve, time: np.ndarray, at: float) -> float:
     return float(curve.values[frame_at(own, at)])
 
 
+def ink_of(curve: Curve) -> tuple[int, ...]:
+    """What a curve is drawn with: its colour as far as it can be told from the ground, pale where it is out of date."""
+    return faded(legible(curve.colour)) if curve.old else legible(curve.colour)
+
+
 def draw_curve(
     painter: QPainter, area: QRectF, x: Scale, y: Scale, curve: Curve, time: np.ndarray, own: np.ndarray | None = None
 ) -> None:
     """One line, decimated to the pixels of the area."""
     clock_of = own if own is not None else (time if curve.time is None else curve.time)
     at, values = envelope(clock_of, curve.values, x.low, x.high, max(1, round(area.width())))
-    painter.setPen(pen(legible(curve.colour), 1.6, curve.dashed))
+    painter.setPen(pen(ink_of(curve), 1.6, curve.dashed))
     polyline(painter, x.pixel(at), y.pixel(values))
 
 
@@ -51,7 +56,7 @@ def legend(painter: QPainter, area: QRectF, curves: tuple[Curve, ...]) -> None:
         width = metrics.horizontalAdvance(text) + 26
         box = QRectF(right - width, area.top() + 2, width, metrics.height() + 2)
         painter.fillRect(box, colour(look.base, 215))
-        painter.setPen(pen(legible(curve.colour), 2.0, curve.dashed))
+        painter.setPen(pen(ink_of(curve), 2.0, curve.dashed))
         middle = box.center().y()
         painter.drawLine(QPointF(box.left() + 4, middle), QPointF(box.left() + 18, middle))
         painter.setPen(colour(look.text))

@@ -77,6 +77,7 @@ class CurvesView(QWidget):
         self._time = np.zeros(0)
         self._all: tuple[Any, ...] = ()
         self._view: tuple[float, float] | None = None
+        self._old = False
         self.tree = QTreeWidget()
         self.tree.setHeaderHidden(True)
         self.tree.setItemDelegate(BoxDelegate(self.tree))
@@ -138,6 +139,7 @@ class CurvesView(QWidget):
         zero_pose: str = "",
         reference: str = "",
         missing: str = "",
+        old: bool = False,
     ) -> None:
         """Show a result.
 
@@ -148,6 +150,7 @@ class CurvesView(QWidget):
         convention, zero_pose : what the angles are, in words
         reference : what the dashed curves are of, in words
         missing : why something that is compared has no curves here, a sentence
+        old : whether the result is out of date
         """
         again = [plot.title for plot in plots] == [plot.title for plot in self._all]
         self._time, self._all = np.asarray(time, float), tuple(plots)
@@ -155,6 +158,8 @@ class CurvesView(QWidget):
         dashed = any(curve.reference is not None for plot in plots for curve in plot.curves)
         against = f" Dashed: {reference or 'compared with'}." if dashed else ""
         told = "Degrees." if self.convention.count() else f"{convention}, degrees."
+        told = f"Out of date. {told}" if old else told
+        self._old = old
         self._title.setText(f"{told}{against} {missing}".rstrip() if plots else "")
         self._title.setToolTip(f"{convention}, degrees.{zero}" if plots else "")
         if not again:
@@ -249,4 +254,4 @@ class CurvesView(QWidget):
     def _show(self) -> None:
         wanted = set(self.shown())
         whole = (float(self._time[0]), float(self._time[-1])) if len(self._time) > 1 else (0.0, 1.0)
-        self.plots.set_plots(self._time, [p for p in self._all if p.title in wanted], self._view or whole)
+        self.plots.set_plots(self._time, [p for p in self._all if p.title in wanted], self._view or whole, self._old)

@@ -44,6 +44,12 @@ def legible(rgb: np.ndarray | tuple[int, ...]) -> tuple[int, ...]:
     return _legible(tuple(int(part) for part in rgb), colours().base)
 
 
+def faded(rgb: np.ndarray | tuple[int, ...]) -> tuple[int, ...]:
+    """The colour half way to the ground of a plot: what is out of date is pale, and words beside it say why."""
+    mixed = 0.5 * np.array(rgb, np.float64) + 0.5 * np.array(colours().base, np.float64)
+    return tuple(np.rint(mixed).astype(int).tolist())
+
+
 def em(widget: QWidget) -> float:
     """Height of a line of text, the measure of everything that has to grow with the font."""
     return QFontMetricsF(widget.font()).height()

@@ -69,6 +69,7 @@ class Curve:
     time : (T,) s if it has a clock of its own, else None
     dashed : True for what is compared with
     framed : False where it may go beyond the axis, which the others decide then
+    old : True for what is out of date: it is drawn pale
     """
 
     label: str
@@ -77,6 +78,7 @@ class Curve:
     time: np.ndarray | None = None
     dashed: bool = False
     framed: bool = True
+    old: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,7 +56,8 @@ class Contents(Sight):
         """A skin of vertices (V, 3) m, None for none, and faces (F, 3).
 
         ``colour`` is one (3), one a vertex (V, 3) uint8, or None for the theme's body colour. ``finer`` makes the
-        vertices and faces that are shown as soon as nothing moves any more, and at once where there is time.
+        vertices and faces, and colours of its own, that are shown as soon as nothing moves any more, and at once where
+        there is time.
         """
         wanted = np.asarray(theme.colours().body if colour is None else colour)
         self._stage.set_mesh(layer, vertices, np.asarray(faces), wanted, opacity, finer)

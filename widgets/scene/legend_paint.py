@@ -69,8 +69,11 @@ class _Panel:
         self._row = self._metrics.height() + 2.0
 
     def kinds(self, title: str, entries: list[tuple[str, Rgb]], also: Legend | None = None) -> QRectF:
-        """Draw a panel, and leave room for another one below it."""
-        below = 0.0 if also is None else (1 + _rows(also)) * self._row + 2 * _PAD + _GAP
+        """Draw a panel, and leave room for those below it."""
+        below = 0.0
+        while also is not None:
+            below += (1 + _rows(also)) * self._row + 2 * _PAD + _GAP
+            also = also.also
         rows = int(max(1, (self._height - self._top - below - _MARGIN - 2 * _PAD - self._row - 4) // self._row))
         swatch = self._metrics.height() * 0.7
         columns = -(-len(entries) // rows)

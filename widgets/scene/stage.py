@@ -23,8 +23,9 @@ from widgets.scene.layers import (
 from widgets.theme import Colours
 
 _Kind = TypeVar("_Kind", bound=Layer)
-Finer = Callable[[], tuple[np.ndarray, np.ndarray]]
-"""Makes the vertices (V, 3) m and faces (F, 3) of a finer skin, when there is time to show it."""
+Finer = Callable[[], tuple[np.ndarray, np.ndarray] | tuple[np.ndarray, np.ndarray, np.ndarray]]
+"""Makes the vertices (V, 3) m and faces (F, 3) of a finer skin, and colours (V, 3) of its own where it has any, when
+there is time to show it."""
 _FINE = " (fine)"
 _COVER_PX = 12.0  # a skin's points, thinned, lie about as far apart
 OVERLAYS = ("labels", "axes", "legend")
@@ -125,7 +126,8 @@ class Stage:
         """Show every skin as fine as there is."""
         for name, (finer, colour, opacity) in self._finer.items():
             if finer is not None:
-                self._layer(_fine(name), MeshLayer).set(*finer(), colour, opacity)
+                vertices, faces, *own = finer()
+                self._layer(_fine(name), MeshLayer).set(vertices, faces, own[0] if own else colour, opacity)
                 self._layers[name].clear()
                 self._finer[name] = None, colour, opacity
 

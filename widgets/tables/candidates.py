@@ -42,6 +42,7 @@ class CandidateRecord:
     covered : share 0..1 of the markers that it explains
     same_as_first : whether it is the first candidate's answer found once more
     in_use : whether the fit goes on from it
+    number : by which other views call it, 0 if it has none yet
     """
 
     part: str
@@ -55,6 +56,7 @@ class CandidateRecord:
     same_as_first: bool = False
     in_use: bool = False
     bones: tuple[str, ...] = ()
+    number: int = 0
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ def candidate_columns(
     states = [f"{row.fate}, same as 1" if row.same_as_first else row.fate for row in rows]
     states = [f"{state}, in use" if row.in_use else state for state, row in zip(states, rows)]
     return [
-        Column("Rank", np.arange(1, len(rows) + 1), tooltip="Place, the best first", colours=colours),
+        _numbers(rows, colours),
         Column(
             "Bones",
             [row.part for row in rows],
@@ -92,6 +94,15 @@ def candidate_columns(
         Column("Distance", figures("distance"), "mm", ".0f", "From the markers to the body as first laid over them"),
         Column("State", states, tooltip="How far the search took it"),
     ]
+
+
+def _numbers(rows: Sequence[Any], colours: np.ndarray | None) -> Column:
+    """The candidates' numbers, by which all views call them; their places for as long as none has one."""
+    numbers = np.array([row.number for row in rows], float)
+    if not numbers.any():
+        return Column("Rank", np.arange(1, len(rows) + 1), tooltip="Place, the best first", colours=colours)
+    tip = "The candidate's number in every view and in the report, the best first; none for what went no further"
+    return Column("No.", np.where(numbers > 0, numbers, np.nan), "", ".0f", tip, colours=colours)
 
 
 class CandidateTable(QWidget):

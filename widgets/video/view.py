@@ -98,7 +98,7 @@ class VideoView(QWidget):
     def set_markers(self, pixels: np.ndarray | None, colours: np.ndarray | None = None) -> None:
         """Markers where the camera would see them, (M, 2) px, NaN hidden, colours (M, 3) uint8 or one for all."""
         self._markers = np.zeros((0, 2)) if pixels is None else np.asarray(pixels, dtype=float)
-        wanted = np.asarray(palette.LOST if colours is None else colours, dtype=np.uint8)
+        wanted = np.asarray(palette.LOST if colours is None or pixels is None else colours, dtype=np.uint8)
         self._colours = np.broadcast_to(wanted, (len(self._markers), 3))
         self.update()
 

@@ -9,6 +9,7 @@ from solver.errors import InputError
 from solver.progress import Progress, silent
 from solver.rotations import kabsch, slerp
 from solver.solve.bundle import locate_camera
+from solver.solve.counting import candidate_number
 from solver.solve.ending import motion_from
 from solver.solve.kinematics import Points, Pose
 from solver.solve.paper.results import BodyState, PaperLocalization, PaperSolve
@@ -42,7 +43,11 @@ def motion_of(
     row = 0 if pinned is None else pinned
     yaws = len(solved.yaws)
     if not 0 <= row < yaws:
-        raise InputError(f"is {row}", "the pinned candidate", f"pin one of the {yaws} yaws, counted from 0")
+        raise InputError(
+            f"is number {candidate_number(row)}, which is not there",
+            "the pinned candidate",
+            f"pin one of 1 to {yaws} (in session.toml, candidate = 0 to {yaws - 1})",
+        )
     chosen = ranked.candidates[row]
     vertex, state = solved.vertex, solved.refined.body
     if chosen.hypothesis != solved.chosen:
@@ -63,7 +68,7 @@ def motion_of(
         camera=chosen.camera,
         chosen=row,
         confidence=ranked.confidence if pinned is None else 1.0,
-        warnings=ranked.warnings if pinned is None else (f"Candidate {row} was pinned by hand.",),
+        warnings=ranked.warnings if pinned is None else (f"Candidate {candidate_number(row)} was pinned by hand.",),
     )
 
 

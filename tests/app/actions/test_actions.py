@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,10 @@ from app.actions.session_actions import may_close, open_path
 from app.cli_commands import DEMO_MARKERS, DEMO_VIDEO
 from app.models import edits
 from app.models.home import Home
+from app.models.results import Ref
 from app.models.stages import states_of
 from app.models.workbench import Said, Workbench
+from solver.io import load_markers
 from solver.pipeline.session import Session, session_folder
 
 
@@ -225,6 +228,59 @@ def test_jumps_go_where_they_say(actions: Actions, solved: Workbench) -> None:
     solved.selection.select_markers([marker])
     assert actions.trigger("go.gap")
     assert not solved.board.current["markers"].present[solved.clock.marker_frame, marker]
+
+
+def _with_gaps(bench: Workbench, present: np.ndarray) -> None:
+    """Have the markers of a recording seen as given, (T, M)."""
+    known = bench.board.current["markers"]
+    positions = np.where(present[..., None], np.zeros(3), np.nan)
+    labels = tuple(f"M{k}" for k in range(present.shape[1]))
+    ref = Ref("markers", bench.board.keys["markers"])
+    bench.board.results._held[ref] = replace(known, positions=positions, labels=labels, filled=None), 0
+    bench.clock.set_timing(replace(bench.clock.timing, frames=len(present)))
+
+
+def test_the_next_gap_is_that_of_any_marker_though_no_frame_shows_them_all(
+    actions: Actions, solved: Workbench, said: list[Said]
+) -> None:
+    present = np.ones((100, 3), bool)
+    present[:50, 0] = False  # in no frame are all three seen
+    present[50:, 1] = False
+    present[20:24, 2] = present[70:71, 2] = False
+    _with_gaps(solved, present)
+    solved.clock.seek_marker_frame(0)
+    visited = []
+    for _ in range(4):
+        assert actions.trigger("go.gap")
+        visited.append(solved.clock.marker_frame)
+    assert visited == [20, 50, 70, 0]
+    solved.selection.select_markers([2])
+    assert actions.trigger("go.gap")
+    assert solved.clock.marker_frame == 20
+    solved.selection.select_markers([1])
+    assert actions.trigger("go.gap")
+    assert solved.clock.marker_frame == 50
+    assert actions.trigger("go.gap")
+    assert "only gap" in said[-1].what
+    _with_gaps(solved, np.ones((100, 3), bool))
+    assert not actions.trigger("go.gap")
+    assert "seen in every frame" in said[-1].what
+
+
+@pytest.mark.parametrize("name", ["nick_freeform_001.c3d", "mcgill_HC040A14_raw_unlabeled.c3d"])
+def test_in_a_real_recording_the_next_gap_is_further_on(
+    actions: Actions, solved: Workbench, shared_data: Path, name: str
+) -> None:
+    present = load_markers(shared_data / "fullbody" / name).present[:2000]
+    assert not present.all(axis=1).any(), "no frame shows every marker"
+    _with_gaps(solved, present)
+    solved.clock.seek_marker_frame(0)
+    frames = [0]
+    for _ in range(5):
+        assert actions.trigger("go.gap")
+        frames.append(solved.clock.marker_frame or 0)
+        assert (present[frames[-1] - 1] & ~present[frames[-1]]).any(), "a marker is lost from here"
+    assert frames == sorted(set(frames))
 
 
 def test_colours_and_layers(actions: Actions, bench: Workbench) -> None:

@@ -13,6 +13,7 @@ from solver.pipeline.inputs import MarkerSettings, SyncSettings
 from solver.pipeline.methods import GRAPHS
 from solver.pipeline.stages_paper import PaperSegmentSettings
 from solver.segment import SegmentSettings
+from solver.solve.settings import FitSettings
 
 ALL = [setting for graph in GRAPHS.values() for stage in graph for setting in settings_of(stage.name, stage.settings())]
 
@@ -102,3 +103,10 @@ def test_every_number_has_a_range_and_every_range_a_setting() -> None:
         if {int, float} & {kind, *get_args(kind)} and get_origin(kind) is not tuple
     }
     assert set(RANGES) == numbers
+
+
+def test_a_candidate_is_counted_from_1_in_its_form_and_from_0_in_the_file() -> None:
+    shown = setting_of("fit", FitSettings(candidate=2), "candidate")
+    assert (shown.value, shown.minimum, shown.default) == (3, 1, None)
+    assert (shown.inner(3), shown.inner(None)) == (2, None)
+    assert shown.said(shown.value) == "3"

@@ -123,7 +123,7 @@ def test_residuals_of_several_fits_share_one_clock(made: Made) -> None:
     """A second fit of frames 10 to 29 alone, twice as far off."""
     part = slice(10, 30)
     second = replace(made.motion, time=made.motion.time[part], residual=2 * made.motion.residual[part])
-    row = residual_row({"now": made.motion, "before": second}, made.motion.time)
+    row = residual_row({"now": made.motion, "before": second}, made.motion.time, own="now")
     now, before = row.curves
     assert row.unit == "mm" and (now.dashed, before.dashed) == (False, True)
     for t in (0, 15, 29):

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -44,23 +45,59 @@ sys.exit(command([sys.argv[2]]))
 """
 
 
-@pytest.fixture
-def display() -> Iterator[str]:
-    """The number of a display that was started for this test."""
-    if shutil.which("Xvfb") is None:
-        pytest.skip("Xvfb is not installed")
+def _server(number: int | None, tcp: bool) -> tuple[subprocess.Popen[bytes], str] | None:
+    """Start a display, of this number or of one that the server finds free; None where it does not start."""
     read, write = os.pipe()
-    command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1600x1000x24", "-nolisten", "tcp"]
+    command = ["Xvfb", *([] if number is None else [f":{number}"]), "-displayfd", str(write)]
+    command += ["-screen", "0", "1600x1000x24"]
+    command += ["-listen", "tcp"] if tcp else ["-ac", "-nolisten", "tcp"]
     server = subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL)
     os.close(write)
-    number = os.read(read, 20).decode().strip()
-    os.close(read)
-    if not number:
-        server.wait(10)
-        pytest.skip("Xvfb does not start here")
-    yield f":{number}"
-    server.terminate()
-    server.wait(20)
+    with os.fdopen(read, "rb") as told:
+        chosen = told.readline().decode().strip()  # the end of the file where the server ends instead
+    if not chosen:
+        server.wait(20)
+        return None
+    return server, f"127.0.0.1:{chosen}" if tcp else f":{chosen}"
+
+
+def _answers(display: str, seconds: float = 5.0) -> bool:
+    """Whether a display takes a connection within some seconds."""
+    end = time.monotonic() + seconds
+    while "does not answer" in display_problem({"DISPLAY": display}):
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.1)
+    return True
+
+
+@pytest.fixture
+def display() -> Iterator[str]:
+    """The name of a display that was started for this test.
+
+    The number that the server finds free may be taken all the same: by a server in another container that shares the
+    network but not the files, whose socket a client then meets. So one that does not answer is given up for a number of
+    our own, and at last, where no socket can be made among the files, for one on this computer's network.
+    """
+    if shutil.which("Xvfb") is None:
+        pytest.skip("Xvfb is not installed")
+    own = 200 + os.getpid() % 5000
+    tried = []
+    for number, tcp in ((None, False), (own, False), (own + 7, False), (own + 13, True)):
+        started = _server(number, tcp)
+        if started is None:
+            tried.append(f"no server on {'a free number' if number is None else number}")
+            continue
+        server, name = started
+        try:
+            if _answers(name):
+                yield name
+                return
+        finally:
+            server.terminate()
+            server.wait(20)
+        tried.append(f"{name} does not answer")
+    pytest.fail(f"Xvfb is installed, but there is no display: {'; '.join(tried)}")
 
 
 def test_the_program_opens_its_window_and_shows_a_session(display: str, session: Session, tmp_path: Path) -> None:
