@@ -39,16 +39,18 @@ class Problem:
     body : with the shape coefficients that are to be found
     seen : the observations
     landmarks : (L) rest points of the body that the video's landmarks show
+    person : px, height of the person in the image; of these observations where not given. Who solves a recording in
+        parts gives that of the whole, or what a landmark counts would depend on the parts
     """
 
-    def __init__(self, body: Body, seen: Observations, landmarks: Points) -> None:
+    def __init__(self, body: Body, seen: Observations, landmarks: Points, person: float | None = None) -> None:
         self.body, self.seen, self.landmarks = body, seen, landmarks
         self.present = np.isfinite(seen.markers).all(axis=2)
         self.target = np.where(self.present[..., None], seen.markers, 0.0)
         self.in_image = np.isfinite(seen.image).all(axis=2) & seen.tracked[:, None]
         self.pixels = np.where(self.in_image[..., None], seen.image, 0.0)
         self.visible = np.where(self.in_image, seen.visibility, 0.0)
-        self.person = _person_height(seen.image, self.in_image)
+        self.person = person_height(seen) if person is None else person
         count, shapes = self.present.shape[1], body.shape_count
         self.shape_at = slice(0, shapes)
         self.camera_at = slice(shapes, shapes + CAMERA_SIZE)
@@ -79,6 +81,11 @@ class Problem:
         """One damped Gauss-Newton step of everything that is free."""
         sums = self.linearised(state, weights, surface)
         return self._moved(state, *sums.solve(self._free(weights), damping))
+
+    def frame_step(self, state: State, weights: Weights, surface: Surface, damping: float) -> np.ndarray:
+        """(F, 69) rad and m: the step of each frame on its own, with all that they share held."""
+        by_frame, _ = self.linearised(state, weights, surface).solve(np.zeros(0, dtype=np.intp), damping)
+        return by_frame
 
     def linearised(self, state: State, weights: Weights, surface: Surface) -> NormalEquations:
         """The normal equations at a state; their slope is half that of the cost summed over frames."""
@@ -226,17 +233,23 @@ class Problem:
         free[self.placement_at] = weights.free_placement
         return np.flatnonzero(free)
 
+    @staticmethod
+    def turned(pose: Pose, by_frame: np.ndarray) -> Pose:
+        """The poses after a step (F, 69) of each frame."""
+        turns = by_frame[:, :-3].reshape(len(by_frame), len(FREE), 3).clip(-_LARGEST_TURN, _LARGEST_TURN)
+        rotations = pose.rotations.copy()
+        rotations[:, FREE] = rotations[:, FREE] @ exp_so3(turns)
+        trans = pose.trans + by_frame[:, -3:].clip(-_LARGEST_MOVE_M, _LARGEST_MOVE_M)
+        return replace(pose, rotations=rotations, trans=trans)
+
     def _moved(self, state: State, by_frame: np.ndarray, shared: np.ndarray) -> State:
         """The state after a step, no part of which goes further than the linearisation can be trusted."""
-        turns = by_frame[:, :-3].reshape(len(by_frame), len(FREE), 3).clip(-_LARGEST_TURN, _LARGEST_TURN)
-        rotations = state.pose.rotations.copy()
-        rotations[:, FREE] = rotations[:, FREE] @ exp_so3(turns)
-        trans = state.pose.trans + by_frame[:, -3:].clip(-_LARGEST_MOVE_M, _LARGEST_MOVE_M)
+        pose = self.turned(state.pose, by_frame)
         betas = state.pose.betas + shared[self.shape_at].clip(-1, 1)
         slide = shared[self.placement_at].clip(-_LARGEST_SLIDE_M, _LARGEST_SLIDE_M).reshape(-1, 3)
         turn, shift, zoom = np.split(shared[self.camera_at], [3, 6])
         return State(
-            Pose(rotations, trans, betas),
+            replace(pose, betas=betas),
             replace(state.placement, rest=state.placement.rest + slide),
             replace(
                 state.camera,
@@ -248,14 +261,15 @@ class Problem:
         )
 
 
-def _person_height(image: np.ndarray, seen: np.ndarray) -> float:
+def person_height(seen: Observations) -> float:
     """How tall the person stands in the landmarks, px, median over frames, at least 50.
 
     The extent changes as a person crouches; how well the network sees them does not.
     """
-    if not seen.any():
+    there = np.isfinite(seen.image).all(axis=2) & seen.tracked[:, None]
+    if not there.any():
         return 50.0
-    low = np.where(seen[..., None], image, np.inf).min(axis=1)
-    high = np.where(seen[..., None], image, -np.inf).max(axis=1)
+    low = np.where(there[..., None], seen.image, np.inf).min(axis=1)
+    high = np.where(there[..., None], seen.image, -np.inf).max(axis=1)
     size = np.linalg.norm((high - low)[np.isfinite(high - low).all(axis=1)], axis=1)
     return max(float(np.median(size)), 50.0)
