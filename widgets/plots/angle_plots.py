@@ -17,6 +17,8 @@ from widgets.plots.rows import Curve
 from widgets.plots.scales import Scale, clock, limits, number, time_ticks
 from widgets.theme import colours
 
+_JUMP_DEG = 120.0
+"""A larger step between two frames is one of the reading, which came in again at the other end of its range."""
 _COLUMN_EM = 34.0
 """Lines of text that a column of plots is wide before there are two."""
 
@@ -178,8 +180,8 @@ class AnglePlots(QWidget):
             for curve in plot.curves:
                 ink = np.array(curve.colour, np.uint8)
                 if curve.reference is not None:
-                    draw_curve(painter, area, x, y, Curve("", curve.reference, ink, dashed=True), self._time)
-                draw_curve(painter, area, x, y, Curve(curve.name, curve.degrees, ink), self._time)
+                    draw_curve(painter, area, x, y, _broken("", self._time, curve.reference, ink, True), self._time)
+                draw_curve(painter, area, x, y, _broken(curve.name, self._time, curve.degrees, ink), self._time)
             painter.setClipping(False)
             if k + columns >= len(areas):
                 self._draw_clock(painter, area, x)
@@ -224,3 +226,10 @@ class AnglePlots(QWidget):
             QToolTip.showText(event.globalPos(), "\n".join(lines), self)
             return True
         return super().event(event)
+
+
+def _broken(name: str, time: np.ndarray, degrees: np.ndarray, ink: Any, dashed: bool = False) -> Curve:
+    """A curve that is interrupted where the reading jumps, instead of crossing the plot upright."""
+    after = np.flatnonzero(np.abs(np.diff(degrees)) > _JUMP_DEG) + 1
+    between = (time[after - 1] + time[after]) / 2
+    return Curve(name, np.insert(degrees, after, np.nan), ink, time=np.insert(time, after, between), dashed=dashed)
