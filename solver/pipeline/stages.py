@@ -94,7 +94,7 @@ GRAPH = (
         _said_landmarks,
         cost=16,
     ),
-    Stage("prior", 1, PriorSettings, ("prior_file", "landmarks"), inputs.pose_prior, PosePrior, cost=2),
+    Stage("prior", 2, PriorSettings, ("prior_file", "landmarks"), inputs.pose_prior, PosePrior, cost=2),
     Stage("sync", 1, SyncSettings, ("clean", "landmarks", "prior"), inputs.synchronise, Sync, _said_sync, cost=1),
     Stage("segment", 1, SegmentSettings, ("clean",), fitting.group_markers, Segmentation, said_segmentation, cost=0.3),
     Stage(

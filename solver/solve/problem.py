@@ -52,6 +52,10 @@ class Problem:
         self.visible = np.where(self.in_image, seen.visibility, 0.0)
         self.person = person_height(seen) if person is None else person
         count, shapes = self.present.shape[1], body.shape_count
+        self.told_shape = 0 if seen.shape is None else len(seen.shape)
+        self.usual_shape = np.zeros(shapes)
+        if seen.shape is not None:
+            self.usual_shape[: self.told_shape] = seen.shape
         self.shape_at = slice(0, shapes)
         self.camera_at = slice(shapes, shapes + CAMERA_SIZE)
         self.bias_at = slice(self.camera_at.stop, self.camera_at.stop + 3 * len(FREE))
@@ -73,7 +77,7 @@ class Problem:
             prior=float(video_residual(self.seen, state, weights)[2].sum() + self._bias(state, weights)) / frames,
             anatomical=float(habit_residual(state, weights)[2].sum()) / frames,
             image=image / frames,
-            shape=weights.shape * float(betas @ betas),
+            shape=weights.shape * float(self._shape_information(weights) @ (betas - self.usual_shape) ** 2),
             placement=float(((height / weights.offset_spread) ** 2).sum()) / frames,
         )
 
@@ -105,6 +109,12 @@ class Problem:
         points = place_points(self.landmarks, forward(self.body, state.pose), state.pose.betas)
         gap = state.camera.project(points, self.seen.image_size) - self.pixels
         return float(np.median(np.linalg.norm(gap, axis=2)[self.in_image]))
+
+    def _shape_information(self, weights: Weights) -> np.ndarray:
+        """(S,) one over the variance of each shape coefficient about the usual: people's, or the video's error."""
+        information = np.ones(len(self.usual_shape))
+        information[: self.told_shape] = weights.video_shape**-2
+        return information
 
     def _bias(self, state: State, weights: Weights) -> float:
         """What the video's bias costs, once and not in every frame."""
@@ -210,9 +220,9 @@ class Problem:
 
     def _add_shared(self, sums: NormalEquations, state: State, surface: Surface, weights: Weights) -> None:
         """Priors of shape, of the video's bias, of each marker's height over the skin; damping of its slide."""
-        strength = len(self.target) * weights.shape
-        sums.h_ss[self.shape_at, self.shape_at] += strength * np.eye(self.shape_at.stop)
-        sums.g_s[self.shape_at] += strength * state.pose.betas
+        strength = len(self.target) * weights.shape * self._shape_information(weights)
+        sums.h_ss[self.shape_at, self.shape_at] += np.diag(strength)
+        sums.g_s[self.shape_at] += strength * (state.pose.betas - self.usual_shape)
         bias = np.radians(weights.bias_deg) ** -2
         sums.h_ss[self.bias_at, self.bias_at] += bias * np.eye(3 * len(FREE))
         sums.g_s[self.bias_at] += bias * bias_residual(state).ravel()
