@@ -92,7 +92,7 @@ def about_axes(rotations: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.
 
 def _within(angles: np.ndarray, ranges: np.ndarray) -> np.ndarray:
     """The angles (T, 3) within half a turn of the middle of their range; of zero where it has no end."""
-    middle = np.where(np.isfinite(ranges).all(axis=1), ranges.sum(axis=1), 0.0) / 2
+    middle = np.where(np.isfinite(ranges), ranges, 0.0).mean(axis=1)
     return middle + _wrapped(angles - middle)
 
 

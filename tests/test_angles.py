@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from solver.angles import AngleSettings, JointAngles, conventions, evidence, joint_angles, read_angles
+from solver.angles import AngleSettings, JointAngles, _columns, conventions, evidence, joint_angles, read_angles
 from solver.body.model import Body
 from solver.body.skeleton import INDEX, JOINTS, mirror_index
 from solver.io.export_angles import angles_long_csv, write_angles
@@ -399,6 +399,15 @@ def test_unmirrored_left_sides_have_mirrored_ranges() -> None:
     found = angles_of("visual3d", **high)
     assert [found["RHIP_ANGLE_Y"], found["LHIP_ANGLE_Y"]] == pytest.approx([-110, 110])
     assert [found["RHIP_ANGLE_X"], found["LHIP_ANGLE_X"]] == pytest.approx([0, 0], abs=1e-6)
+    ranges = {column.name: column.ranges for column in _columns("visual3d")}
+    right, left = ranges["RHIP_ANGLE_Y"], ranges["LHIP_ANGLE_Y"]
+    assert right.tolist() == [[-40, 150], [-120, 60], [-90, 90]] and left.tolist() == [
+        [-40, 150],
+        [-60, 120],
+        [-90, 90],
+    ]
+    mirrored = {column.name: column.ranges for column in _columns("isb")}
+    assert np.array_equal(mirrored["hip_adduction_r"], mirrored["hip_adduction_l"]), "mirrored before it is read"
 
 
 def test_jumps_of_the_reading_are_flagged() -> None:
