@@ -13,7 +13,7 @@ import numpy as np
 from resources import resource
 from solver.body.anatomy import SEGMENT_JOINT, segment_frames
 from solver.body.skeleton import INDEX, JOINTS, PARENTS
-from solver.cardan import about_axes, cardan
+from solver.cardan import TURNS, about_axes, cardan
 from solver.markers import lab_rotation
 from solver.rotations import exp_so3
 
@@ -30,6 +30,7 @@ _PAIRS = {
     "wrist": ("forearm", "hand"),
 }
 """Proximal and distal segment of each joint; the pelvis is read in the lab."""
+_JUMP_DEG = 120.0
 _MIDLINE = ("", "pelvis", "thorax")
 _MIRROR = np.array([1.0, 1, -1])
 _CARRIERS = {
@@ -72,7 +73,7 @@ class JointAngles:
     ----------
     time : (T,) s, the marker file's clock
     names : A column names
-    degrees : (T, A), unwrapped over time
+    degrees : (T, A), each frame within what the joint can do, whatever came before
     singular : (T, A) True where the sequence cannot tell this angle from another: its value means nothing there
     convention, title : which convention, and what it is
     sequence : A, the intrinsic sequence, or the axes, that each angle is part of
@@ -89,6 +90,17 @@ class JointAngles:
     sequence: tuple[str, ...]
     positive: tuple[str, ...]
     zero_pose: str
+
+    @property
+    def jumps(self) -> np.ndarray:
+        """(T, A) True where a defined angle is over 120 degrees from the frame before: the reading changed, no joint.
+
+        An angle that goes round comes in again at the other end of its range.
+        """
+        found = np.zeros(self.degrees.shape, dtype=bool)
+        defined = ~self.singular
+        found[1:] = (np.abs(np.diff(self.degrees, axis=0)) > _JUMP_DEG) & defined[1:] & defined[:-1]
+        return found
 
 
 @cache
@@ -145,7 +157,9 @@ def read_angles(time: np.ndarray, segments: Mapping[str, np.ndarray], settings: 
         if column.mirrored:
             relative = _MIRROR[:, None] * relative * _MIRROR
         angles, singular = (
-            cardan(relative, column.sequence) if column.axes is None else about_axes(relative, column.axes)
+            cardan(relative, column.sequence, column.ranges)
+            if column.axes is None
+            else about_axes(relative, column.axes)
         )
         values[:, i], flags[:, i] = column.sign * angles[:, column.place], singular[:, column.place]
     return JointAngles(
@@ -193,6 +207,7 @@ class _Column:
     place: int
     sign: int
     positive: str
+    ranges: np.ndarray
 
 
 def _columns(convention: str) -> Iterator[_Column]:
@@ -214,7 +229,26 @@ def _columns(convention: str) -> Iterator[_Column]:
                         place=place,
                         sign=row["signs"][place],
                         positive=row["positive"][place],
+                        ranges=_ranges(row, side == "left" and not about["mirror"])
+                        if axes is None
+                        else np.zeros((0, 2)),
                     )
+
+
+def _ranges(row: Mapping[str, Any], flipped: bool) -> np.ndarray:
+    """(3, 2) degrees, what each turn of a joint's sequence can be, before its sign.
+
+    Parameters
+    ----------
+    row : of the joint: ``range`` is as its columns are read on the right, an empty one counts turns
+    flipped : for a left side that is not mirrored before it is read
+    """
+    ranges = np.array([sorted(sign * end for end in ends) or TURNS for sign, ends in zip(row["signs"], row["range"])])
+    if flipped:  # turns about X and Y change their sense in the mirror, turns about Z do not
+        for k, axis in enumerate(row["sequence"]):
+            if axis != "Z":
+                ranges[k] = -ranges[k, ::-1]
+    return ranges
 
 
 def _lab(pelvis: np.ndarray, quarter_turns: bool) -> np.ndarray:

@@ -1,9 +1,8 @@
-"""Three angles out of a rotation, followed over time through what the sequence cannot tell apart."""
+"""Three angles out of a rotation, each frame read by itself within what the joint can do."""
 
 from __future__ import annotations
 
 import warnings
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,22 +11,32 @@ from solver.rotations import exp_so3, log_so3
 
 SINGULAR_DEG = 4.0
 """Nearer than this to a singularity, an error of the rotation is more than 14 times as large in the outer angles."""
+TURNS = (-np.inf, np.inf)
+"""The range of an angle that is no joint's: a heading, whose turns are counted over time."""
+_FROM_ZERO = 0.25
+"""Share of the way from the anatomical position that counts beside what lies outside of the ranges."""
 _STEP_DEG = 90.0
 """A larger step across a singular stretch is not taken for a continued turn."""
-_ITERATIONS = 12
-"""Gauss-Newton steps from zero, for turns up to a right angle."""
+_ITERATIONS = 30
+_STILL = 1e-10
+"""rad, a step of the last iteration."""
 
 
-def cardan(rotations: np.ndarray, sequence: str) -> tuple[np.ndarray, np.ndarray]:
-    """Intrinsic angles (T, 3) in degrees, unwrapped over time, and (T, 3) True where they are not defined.
+def cardan(rotations: np.ndarray, sequence: str, ranges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Intrinsic angles (T, 3) in degrees within what the joint can do, and (T, 3) True where they are not defined.
+
+    A rotation has two triples of angles, and each angle goes round in whole turns. Every frame takes the triple that
+    goes least beyond the ranges, counted together with a share of its way from zero; each angle is given within half a
+    turn of the middle of its range. What came before does not matter: nothing winds up, and what stands still reads
+    the same however it got there. Only an angle that ranges over ``TURNS`` is followed over time.
+
+    An arm raised sideways overhead is thus abducted by 120 degrees, not flexed by 180, abducted by 60, turned by 180.
 
     Parameters
     ----------
     rotations : (T, 3, 3)
-    sequence : three of X, Y, Z. Where it begins and ends with the same axis, the middle angle is taken as negative, as
-        ISB does for the shoulder; else it lies within [-90, 90] degrees, or beyond where that brings all three angles
-        nearer to zero: an arm raised sideways overhead is abducted by 120 degrees, not flexed by 180, abducted by 60
-        and turned by 180.
+    sequence : three of X, Y, Z; where the first is the last, the sign of the middle angle's range decides
+    ranges : (3, 2) degrees, least and greatest of each angle
 
     Near a singularity the first and the third angle cannot be told apart; the middle one stays good.
     """
@@ -36,26 +45,29 @@ def cardan(rotations: np.ndarray, sequence: str) -> tuple[np.ndarray, np.ndarray
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # gimbal lock is flagged below
         turns: Any = Rotation.from_matrix(rotations)
-        angles = turns.as_euler(sequence, degrees=True)
-    if sequence[0] == sequence[2]:
-        angles = np.stack([angles[:, 0] + 180, -angles[:, 1], angles[:, 2] + 180], axis=1)
-        distance = np.abs(np.sin(np.radians(angles[:, 1])))
-        beyond = np.zeros(len(angles), bool)
+        first = turns.as_euler(sequence, degrees=True)
+    repeated = sequence[0] == sequence[2]
+    middle = -first[:, 1] if repeated else 180 - first[:, 1]
+    second = np.stack([first[:, 0] + 180, middle, first[:, 2] + 180], axis=1)
+    distance = np.abs((np.sin if repeated else np.cos)(np.radians(first[:, 1])))
+    first, second = _within(first, ranges), _within(second, ranges)
+    if repeated:  # their middle angles differ in sign alone, and the range has one sign
+        chosen = np.abs(first[:, 1] - ranges[1].mean()) <= np.abs(second[:, 1] - ranges[1].mean())
     else:
-        distance = np.abs(np.cos(np.radians(angles[:, 1])))
-        beyond = _beyond(angles, distance)
-        angles[beyond] = _other_branch(angles[beyond])
+        chosen = _beyond(first, ranges) <= _beyond(second, ranges)
+    angles = np.where(chosen[:, None], first, second)
     lost = distance < np.sin(np.radians(SINGULAR_DEG))
-    for k in (0, 2):
+    for k in np.flatnonzero(~np.isfinite(ranges).all(axis=1)):
         angles[:, k] = _followed(angles[:, k], ~lost)
     return angles, np.stack([lost, np.zeros_like(lost), lost], axis=1)
 
 
 def about_axes(rotations: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Angles (T, 2) in degrees about two fixed axes of a joint that has no third, and (T, 2) all False.
+    """Angles (T, 2) in degrees about two fixed axes of a joint that has no third, and (T, 2) True where not defined.
 
     The turn about the first axis followed by that about the second, which the first one carries along, that comes
-    nearest to the rotation. The axes need not be square to each other: an ankle's are not.
+    nearest to the rotation. The axes need not be square to each other: an ankle's are not. Further than a right angle
+    from zero the search may not come to rest: such a frame is flagged.
 
     Parameters
     ----------
@@ -64,48 +76,35 @@ def about_axes(rotations: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.
     """
     first, second = axes / np.linalg.norm(axes, axis=1, keepdims=True)
     angles = np.zeros((len(rotations), 2))
+    step = np.full_like(angles, np.inf)
     for _ in range(_ITERATIONS):
         turn = exp_so3(angles[:, 1:] * second)
         missing = log_so3(np.swapaxes(exp_so3(angles[:, :1] * first) @ turn, 1, 2) @ rotations)
         slopes = np.stack([np.swapaxes(turn, 1, 2) @ first, np.broadcast_to(second, (len(turn), 3))], axis=2)
         normal = np.swapaxes(slopes, 1, 2)
-        angles += np.linalg.solve(normal @ slopes, normal @ missing[..., None])[..., 0]
-    angles = np.unwrap(_wrapped(np.degrees(angles)), period=360, axis=0)
-    return angles, np.zeros(angles.shape, bool)
+        step = np.linalg.solve(normal @ slopes, normal @ missing[..., None])[..., 0]
+        angles += step
+        if (np.abs(step) < _STILL).all():
+            break
+    lost = (np.abs(step) > np.radians(0.01)).any(axis=1)
+    return _wrapped(np.degrees(angles)), np.stack([lost, lost], axis=1)
 
 
-def _beyond(angles: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """(T,) True where the second solution, whose middle angle is beyond 90 degrees, is clearly nearer to zero.
+def _within(angles: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """The angles (T, 3) within half a turn of the middle of their range; of zero where it has no end."""
+    middle = np.where(np.isfinite(ranges), ranges, 0.0).mean(axis=1)
+    return middle + _wrapped(angles - middle)
 
-    Decided once for each stretch between singularities, and at a singularity where the angles come closest to it: a
-    choice per stretch cannot drift over a long recording.
+
+def _beyond(angles: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """(T,) degrees that the triples lie outside of the ranges, with a share of their way from zero.
+
+    The share decides where two triples lie within: an arm turned out by 95 degrees hangs, and is not flexed by 180 and
+    abducted by 180.
     """
-    good = distance >= np.sin(np.radians(SINGULAR_DEG))
-    chosen = np.zeros(len(angles), bool)
-    runs = _runs(good)
-    for run in runs:
-        ours, other = (
-            np.median(np.abs(_wrapped(candidate)).sum(axis=1))
-            for candidate in (angles[run], _other_branch(angles[run]))
-        )
-        chosen[run] = other + 90 < ours
-    ends = [slice(0, 0), *runs, slice(len(angles), len(angles))]
-    for before, after in pairwise(ends):
-        gap = slice(before.stop, after.start)
-        if gap.stop > gap.start:
-            nearest = gap.start + int(np.argmin(distance[gap]))
-            first = chosen[before.stop - 1] if before.stop else chosen[min(after.start, len(chosen) - 1)]
-            last = chosen[after.start] if after.start < len(chosen) else first
-            chosen[gap.start : nearest] = first
-            chosen[nearest : gap.stop] = last
-    return chosen
-
-
-def _other_branch(angles: np.ndarray) -> np.ndarray:
-    """The second triple of angles with the same rotation, for sequences of three axes."""
-    turned = np.stack([angles[:, 0] + 180, 180 - angles[:, 1], angles[:, 2] + 180], axis=1)
-    turned[:, 1] = _wrapped(turned[:, 1])
-    return turned
+    outside = np.maximum(ranges[:, 0] - angles, 0) + np.maximum(angles - ranges[:, 1], 0)
+    counted = np.isfinite(ranges).all(axis=1)
+    return (outside + _FROM_ZERO * np.abs(angles))[:, counted].sum(axis=1)
 
 
 def _followed(values: np.ndarray, good: np.ndarray) -> np.ndarray:

@@ -142,9 +142,16 @@ def angle_table(path: str | Path, body: str | Path | None = None) -> AngleTable:
 
 
 def _at(table: AngleTable, name: str, time: np.ndarray) -> np.ndarray:
-    """(W,) rad at other times, linear between frames; a step of more than half a turn is a wrap."""
+    """(W,) rad at other times, linear between frames; a step of more than half a turn is a wrap.
+
+    A step of more than a quarter that remains is a change of the reading: there the nearest frame counts.
+    """
     values = table.radians[name]
     known = np.isfinite(values)
     unwrapped = values.copy()
     unwrapped[known] = np.unwrap(values[known])
-    return metrics.points_at(table.time, unwrapped, time)
+    between = metrics.points_at(table.time, unwrapped, time)
+    after = np.clip(np.searchsorted(table.time, time), 1, len(table.time) - 1)
+    first, last = unwrapped[after - 1], unwrapped[after]
+    nearest = np.where(time - table.time[after - 1] < table.time[after] - time, first, last)
+    return np.where(np.isfinite(between) & (np.abs(last - first) > np.pi / 2), nearest, between)

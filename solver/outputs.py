@@ -190,7 +190,8 @@ def write_motion(path: Path, markers: Markers, motion: FittedMotion, betas_count
             "marker_vertex": motion.marker_vertex,
             "marker_labels": np.array(markers.labels),
             "time": motion.time,
-        },
+        }
+        | ({} if motion.settled is None else {"settled": motion.settled, "settled_deg": motion.settled_deg}),
     )
 
 

@@ -17,9 +17,11 @@ class PosePrior:
         (x right, y down, z away), the others are parent-relative in the rest body's axes (SMPL layout)
     tracked : (F,) True where the video tracked the person; elsewhere the pose is filled in
     time : (F,) s in the video's clock
-    betas : (S,) shape if it belongs to the body in use, else None (SMPL shapes do not transfer)
+    betas : (S,) shape coefficients that the program found, median over its frames, None where it says none; they mean
+        something on a body of ``kind`` alone
     source : path it was read from or made from
     notes : what was assumed while reading, one sentence each
+    kind : of the body that ``betas`` belong to: "smpl", "smplh", "smplx"; "" where that is not known
     """
 
     rotations: np.ndarray
@@ -28,3 +30,4 @@ class PosePrior:
     betas: np.ndarray | None = None
     source: str = ""
     notes: tuple[str, ...] = ()
+    kind: str = ""

@@ -12,6 +12,8 @@ import numpy as np
 
 from solver.report_data import AngleCurve, Gaps, Groups
 
+_JUMP_DEG = 120.0
+"""A larger step between two frames is one of the reading, which came in again at the other end of its range."""
 _MOST_BUCKETS = 320
 _TEAL, _SLATE, _AMBER = (15, 138, 138), (120, 134, 150), (214, 98, 43)
 
@@ -157,7 +159,8 @@ def angle_plot(curve: AngleCurve) -> str:
             parts.append(f'<rect class="band" x="{xa:.1f}" y="{top}" {size}/>')
     for side, line in curve.sides.items():
         keep = _thinned(line)
-        parts.append(f'<path class="line {side or "both"}" d="{_path(x(curve.time[keep]), y(line[keep]))}"/>')
+        path = _path(x(curve.time[keep]), y(line[keep]), np.abs(np.diff(line[keep])) > _JUMP_DEG)
+        parts.append(f'<path class="line {side or "both"}" d="{path}"/>')
     return "".join([*parts, "</svg>"])
 
 
@@ -189,10 +192,11 @@ def gaps_plot(gaps: Gaps) -> str:
     return "".join([*parts, "</svg>"])
 
 
-def _path(x: np.ndarray, y: np.ndarray) -> str:
-    """Path data with a break wherever a value is missing."""
+def _path(x: np.ndarray, y: np.ndarray, jumps: np.ndarray) -> str:
+    """Path data with a break wherever a value is missing, or jumps (N - 1,) from the one before."""
     pieces, drawing = [], False
-    for a, b in zip(x, y):
+    for a, b, jumped in zip(x, y, [False, *jumps]):
+        drawing = drawing and not jumped
         if not np.isfinite(b):
             drawing = False
             continue

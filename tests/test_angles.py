@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from solver.angles import AngleSettings, JointAngles, conventions, evidence, joint_angles, read_angles
+from solver.angles import AngleSettings, JointAngles, _columns, conventions, evidence, joint_angles, read_angles
 from solver.body.model import Body
 from solver.body.skeleton import INDEX, JOINTS, mirror_index
 from solver.io.export_angles import angles_long_csv, write_angles
@@ -339,6 +339,90 @@ def test_plain_movements_have_the_angle_one_would_say(movement: str) -> None:
                 assert abs(value - rest[column]) < 1e-6, (
                     f"{convention}: {column} went to {value:.2f} from {rest[column]:.2f}"
                 )
+
+
+SWINGS = ("opensim", "isb")
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+@pytest.mark.parametrize("convention", SWINGS)
+def test_an_overhead_swing_ends_where_it_began(convention: str, side: str) -> None:
+    """Up in front, down at the side, three times: the arm at the side reads as before, and the same on both sides."""
+    shoulder, sign = f"{side}_shoulder", 1 if side == "right" else -1
+    tip = 15.0  # never quite hanging, where ISB's sequence is singular
+    forwards = [turn(x=-angle) @ HANGING[shoulder] for angle in np.arange(tip, 178, 3)]
+    down = [turn(z=sign * (90 - angle)) for angle in np.arange(175, tip, -3.0)]
+    frames = (forwards + down) * 3 + forwards[:1]
+    rotations = np.tile(np.eye(3), (len(frames), 24, 1, 1))
+    for name, matrix in STANDING.items():
+        rotations[:, INDEX[name]] = matrix
+    rotations[:, INDEX[shoulder]] = frames
+    found = joint_angles(
+        np.arange(len(frames)) / 100,
+        at_home(rotations),
+        *square_body(),
+        AngleSettings(convention=convention),  # type: ignore[arg-type]
+    )
+    columns = [i for i, name in enumerate(found.names) if name.startswith(("arm", "shoulder")) and name[-1] == side[0]]
+    values = found.degrees[:, columns]
+    assert len(columns) == 3
+    assert np.abs(values[-1] - values[0]).max() < 1e-6
+    expected = {"opensim": [tip, 0, 0], "isb": [90, -tip, -90]}[convention]
+    assert np.abs(values[-1] - expected).max() < 1e-6, f"{values[-1]} at the side, not {expected}"
+    assert np.abs(values).max() <= 200
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_every_reading_lies_within_half_a_turn_of_the_joints_range(convention: str) -> None:
+    """Random turns of every joint, in random order: no angle but a heading depends on the frames before."""
+    rng = np.random.default_rng(8)
+    rotations = Rotation.from_rotvec(rng.normal(0, 1.2, (24 * 60, 3))).as_matrix().reshape(60, 24, 3, 3)
+    order = rng.permutation(60)
+    found, other = (
+        joint_angles(np.arange(60.0), r, *square_body(), AngleSettings(convention=convention))  # type: ignore[arg-type]
+        for r in (at_home(rotations), at_home(rotations[order]))
+    )
+    if conventions()[convention]["lab"] == "as recorded":
+        free = [name.lower().endswith("pelvis_rotation") for name in found.names]
+    else:  # the lab is turned to where the subject faces on average, alike in both
+        free = [name.lower() in ("pelvis_angle_z", "rpelvisanglesz", "lpelvisanglesz") for name in found.names]
+    assert sum(free) in (1, 2)
+    held = ~np.array(free)
+    assert np.abs(found.degrees[order][:, held] - other.degrees[:, held]).max() < 1e-6
+    ranged = [ends for row in conventions()[convention]["joints"].values() for ends in row.get("range", ()) if ends]
+    assert np.abs(found.degrees[:, held]).max() <= 180 + max(abs(sum(ends)) / 2 for ends in ranged) + 1e-6
+
+
+def test_unmirrored_left_sides_have_mirrored_ranges() -> None:
+    """A left leg lifted sideways beyond a right angle is abducted, which counts up there, as on the right down."""
+    high = {"right_hip": turn(z=-110), "left_hip": turn(z=110)}
+    found = angles_of("visual3d", **high)
+    assert [found["RHIP_ANGLE_Y"], found["LHIP_ANGLE_Y"]] == pytest.approx([-110, 110])
+    assert [found["RHIP_ANGLE_X"], found["LHIP_ANGLE_X"]] == pytest.approx([0, 0], abs=1e-6)
+    ranges = {column.name: column.ranges for column in _columns("visual3d")}
+    right, left = ranges["RHIP_ANGLE_Y"], ranges["LHIP_ANGLE_Y"]
+    assert right.tolist() == [[-40, 150], [-120, 60], [-90, 90]] and left.tolist() == [
+        [-40, 150],
+        [-60, 120],
+        [-90, 90],
+    ]
+    mirrored = {column.name: column.ranges for column in _columns("isb")}
+    assert np.array_equal(mirrored["hip_adduction_r"], mirrored["hip_adduction_l"]), "mirrored before it is read"
+
+
+def test_jumps_of_the_reading_are_flagged() -> None:
+    """An arm swung right round in front comes in again at the other end of its range, and that frame is flagged."""
+    rotations = np.tile(np.eye(3), (120, 24, 1, 1))
+    for name, matrix in STANDING.items():
+        rotations[:, INDEX[name]] = matrix
+    rotations[:, INDEX["right_shoulder"]] = [turn(x=-3.0 * i) @ HANGING["right_shoulder"] for i in range(120)]
+    found = joint_angles(np.arange(120) / 100, at_home(rotations), *square_body(), AngleSettings())
+    column = found.names.index("arm_flex_r")
+    (frame,) = np.flatnonzero(found.jumps[:, column])
+    assert found.degrees[frame - 1, column] > 200 and found.degrees[frame, column] < -100
+    assert found.jumps.sum() == 1
+    about = found.degrees[-1, column]
+    assert about == pytest.approx(-3), "back at the side, three degrees behind it"
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS)

@@ -250,3 +250,10 @@ def test_pictures_are_in_the_page_itself() -> None:
     assert f'src="data:image/png;base64,{content}"' in page
     assert "From the &lt;left&gt;</figcaption>" in page
     assert "figcaption>" not in render(ReportData("walk"))
+
+
+def test_a_curve_breaks_where_its_reading_jumps() -> None:
+    values = np.concatenate([np.linspace(150, 230, 50), np.linspace(-128, -60, 50)])
+    drawing = angle_plot(AngleCurve("Arm flexion", "degrees", np.arange(100.0), {"right": values}))
+    line = drawing.split('class="line right" d="')[1].split('"')[0]
+    assert line.count("M") == 2, "two pieces, no upright stroke between them"

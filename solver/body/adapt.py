@@ -43,6 +43,7 @@ def load_smpl(path: str | Path) -> Body:
         betas_count=data["shapedirs"].shape[2],
         pose_dirs=data.get("posedirs"),
         name=Path(path).name,
+        kind="smpl",
         digest=hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16],
     )
     return _named_like(own, Body.load())

@@ -38,6 +38,7 @@ class Body:
     pose_dirs : (V, 3, 207) m pose-dependent correctives of an SMPL file, else None
     betas_count : how many of the S coefficients are the file's own; the rest are bone lengths
     digest : of the file, for provenance
+    kind : "smpl" where the shape coefficients are those of SMPL, "" for the embedded body
     """
 
     template: np.ndarray
@@ -58,6 +59,7 @@ class Body:
     pose_dirs: np.ndarray | None = None
     name: str = ""
     digest: str = ""
+    kind: str = ""
     _torch: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @classmethod

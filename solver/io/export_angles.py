@@ -41,10 +41,11 @@ def write_angles(
                 "sequence": sequence,
                 "positive": positive,
                 "singular_frames": int(flags.sum()),
+                "jumps_s": [round(float(t), 6) for t in angles.time[jumps]],
                 **({} if evidence is None else {"evidence": evidence[name]}),
             }
-            for name, sequence, positive, flags in zip(
-                angles.names, angles.sequence, angles.positive, angles.singular.T, strict=True
+            for name, sequence, positive, flags, jumps in zip(
+                angles.names, angles.sequence, angles.positive, angles.singular.T, angles.jumps.T, strict=True
             )
         ],
         **provenance,

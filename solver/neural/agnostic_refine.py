@@ -1,4 +1,4 @@
-"""A short descent from the network's poses, where the body and the places of its markers are known."""
+"""A descent from the network's poses, where the body and the places of its markers are known."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from solver.solve.state import Camera, Observations, State, Surface, Weights
 
 
 def refine(body: Body, person: Marked, markers: np.ndarray, start: Solved, network_deg: float = 8.0) -> Solved:
-    """A few Gauss-Newton steps in every frame, held by the network's joint rotations.
+    """Every frame iterated until it has settled, held by the network's joint rotations.
 
     Parameters
     ----------
@@ -32,5 +32,5 @@ def refine(body: Body, person: Marked, markers: np.ndarray, start: Solved, netwo
     state = State(pose, points, Camera(np.eye(3), np.zeros(3), np.zeros(3), 1.0))
     weights = Weights(prior_deg=network_deg, root_deg=network_deg, anatomical=0.0)
     surface = Surface(person.rest, np.zeros_like(person.rest))
-    found = every_frame(still, seen, none, np.arange(frames), state, surface, weights, start=pose)
+    found = every_frame(still, seen, none, np.arange(frames), state, surface, weights, start=pose).pose
     return Solved(found.rotations, found.trans, start.seen)

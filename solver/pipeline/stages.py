@@ -61,7 +61,11 @@ def said_orientation(ranked: Orientation) -> str:
 def said_fit(motion: FittedMotion) -> str:
     """How near the markers are."""
     residual = 1000 * np.nanmedian(motion.residual)
-    return f"{len(motion.time)} frames, markers {residual:.1f} mm from their places (median)"
+    said = f"{len(motion.time)} frames, markers {residual:.1f} mm from their places (median)"
+    if motion.settled is None:
+        return said
+    which = "all" if motion.settled.all() else f"{motion.settled.sum()} of them"
+    return f"{said}, {which} iterated to {motion.settled_deg:g} degrees"
 
 
 def _said_surface(found: SurfaceDistance) -> str:
@@ -90,7 +94,7 @@ GRAPH = (
         _said_landmarks,
         cost=16,
     ),
-    Stage("prior", 1, PriorSettings, ("prior_file", "landmarks"), inputs.pose_prior, PosePrior, cost=2),
+    Stage("prior", 2, PriorSettings, ("prior_file", "landmarks"), inputs.pose_prior, PosePrior, cost=2),
     Stage("sync", 1, SyncSettings, ("clean", "landmarks", "prior"), inputs.synchronise, Sync, _said_sync, cost=1),
     Stage("segment", 1, SegmentSettings, ("clean",), fitting.group_markers, Segmentation, said_segmentation, cost=0.3),
     Stage(
@@ -115,7 +119,7 @@ GRAPH = (
     ),
     Stage(
         "fit",
-        3,
+        4,
         FitSettings,
         (*FITTED_TO, "localize", "orient"),
         fitting.fit_every_frame,
@@ -123,7 +127,7 @@ GRAPH = (
         said_fit,
         cost=2,
     ),
-    Stage("angles", 2, AngleSettings, ("fit", "body_file"), fitting.read_angles, JointAngles, _said_angles, cost=0.1),
+    Stage("angles", 3, AngleSettings, ("fit", "body_file"), fitting.read_angles, JointAngles, _said_angles, cost=0.1),
     Stage(
         "surface",
         1,

@@ -108,7 +108,7 @@ def said_poses(poses: NetworkPoses) -> str:
 _OWN = (
     Stage(
         "network",
-        SHIPPED_VERSION,
+        SHIPPED_VERSION + 1,  # the default fit beside it iterates every frame to its end
         NetworkSettings,
         (*FITTED_TO, "localize", "orient", "weights_file"),
         ask_network,
@@ -118,7 +118,7 @@ _OWN = (
     ),
     Stage(
         "fit",
-        1,
+        2,
         NeuralFitSettings,
         (*FITTED_TO, "localize", "orient", "network", "weights_file"),
         fit_from_poses,

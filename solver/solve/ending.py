@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from solver.body.model import Body
+from solver.solve.converge import TOLERANCE_DEG, Settled
 from solver.solve.kinematics import Points, Pose, forward, place_points
 from solver.solve.results import CameraResult, FittedMotion
 
@@ -15,7 +16,7 @@ def motion_from(
     body: Body,
     markers: np.ndarray,
     time: np.ndarray,
-    pose: Pose,
+    pose: Pose | Settled,
     used: np.ndarray,
     placement: Points,
     sites: tuple[np.ndarray, np.ndarray],
@@ -31,13 +32,16 @@ def motion_from(
     ----------
     markers : (T, M, 3) m, NaN = lost, all of the recording
     time : (T,) s
-    pose : of all T frames
+    pose : of all T frames, with whether each has settled where it was iterated until then
     used : (U,) those of the markers that were fitted
     placement : of these on the rest body
     sites : (U,) the bone and (U,) the vertex each of them is said to sit on
     camera, chosen, confidence, warnings : as in the result
     """
-    count = markers.shape[1]
+    count, settled = markers.shape[1], None
+    if isinstance(pose, Settled):
+        warnings = (*warnings, *pose.notes())
+        settled, pose = pose.settled, pose.pose
     links = forward(body, pose)
     placed = np.full((len(time), count, 3), np.nan)
     placed[:, used] = place_points(placement, links, pose.betas)
@@ -57,4 +61,6 @@ def motion_from(
         chosen=chosen,
         confidence=confidence,
         warnings=tuple(warnings),
+        settled_deg=np.nan if settled is None else TOLERANCE_DEG,
+        settled=settled,
     )

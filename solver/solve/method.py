@@ -13,6 +13,7 @@ from solver.localize import Hypothesis, Search, hypotheses
 from solver.progress import Progress, silent
 from solver.rotations import log_so3
 from solver.solve.bundle import FINE, Fit, descend, relax
+from solver.solve.converge import Settled
 from solver.solve.counting import candidate_number
 from solver.solve.ending import motion_from
 from solver.solve.kinematics import Points, Pose, forward, place_points
@@ -192,7 +193,7 @@ def fitted_motion(
     ranked: Orientation,
     settings: FitSettings,
     state: State,
-    pose: Pose,
+    pose: Pose | Settled,
     time: np.ndarray,
 ) -> FittedMotion:
     """What a fit leaves, of the poses of all frames.

@@ -36,14 +36,23 @@ def observe(
     if landmarks is None:
         none = np.zeros((len(wanted), 0))
         points = Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
-        return Observations(markers.positions, rotations, tracked, none[..., None].repeat(2, -1), none, (0, 0)), points
+        image = none[..., None].repeat(2, -1)
+        return Observations(markers.positions, rotations, tracked, image, none, (0, 0), _shape(prior, body)), points
     points, column = landmark_points(body)
     seen = _covered(landmarks.time, landmarks.tracked, wanted)
     used = landmarks.tracked
     image = _at(landmarks.time[used], landmarks.image[used][:, column], wanted)
     visibility = np.clip(_at(landmarks.time[used], landmarks.visibility[used][:, column], wanted), 0, 1)
     image[~seen] = np.nan
-    return Observations(markers.positions, rotations, tracked, image, visibility, landmarks.image_size), points
+    size, shape = landmarks.image_size, _shape(prior, body)
+    return Observations(markers.positions, rotations, tracked, image, visibility, size, shape), points
+
+
+def _shape(prior: PosePrior, body: Body) -> np.ndarray | None:
+    """The video's shape coefficients that the body has too; None where they belong to another kind of body."""
+    if prior.betas is None or not prior.kind or prior.kind != body.kind:
+        return None
+    return prior.betas[: body.betas_count]
 
 
 def _covered(times: np.ndarray, tracked: np.ndarray, wanted: np.ndarray) -> np.ndarray:

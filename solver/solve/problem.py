@@ -39,17 +39,23 @@ class Problem:
     body : with the shape coefficients that are to be found
     seen : the observations
     landmarks : (L) rest points of the body that the video's landmarks show
+    person : px, height of the person in the image; of these observations where not given. Who solves a recording in
+        parts gives that of the whole, or what a landmark counts would depend on the parts
     """
 
-    def __init__(self, body: Body, seen: Observations, landmarks: Points) -> None:
+    def __init__(self, body: Body, seen: Observations, landmarks: Points, person: float | None = None) -> None:
         self.body, self.seen, self.landmarks = body, seen, landmarks
         self.present = np.isfinite(seen.markers).all(axis=2)
         self.target = np.where(self.present[..., None], seen.markers, 0.0)
         self.in_image = np.isfinite(seen.image).all(axis=2) & seen.tracked[:, None]
         self.pixels = np.where(self.in_image[..., None], seen.image, 0.0)
         self.visible = np.where(self.in_image, seen.visibility, 0.0)
-        self.person = _person_height(seen.image, self.in_image)
+        self.person = person_height(seen) if person is None else person
         count, shapes = self.present.shape[1], body.shape_count
+        self.told_shape = 0 if seen.shape is None else len(seen.shape)
+        self.usual_shape = np.zeros(shapes)
+        if seen.shape is not None:
+            self.usual_shape[: self.told_shape] = seen.shape
         self.shape_at = slice(0, shapes)
         self.camera_at = slice(shapes, shapes + CAMERA_SIZE)
         self.bias_at = slice(self.camera_at.stop, self.camera_at.stop + 3 * len(FREE))
@@ -71,7 +77,7 @@ class Problem:
             prior=float(video_residual(self.seen, state, weights)[2].sum() + self._bias(state, weights)) / frames,
             anatomical=float(habit_residual(state, weights)[2].sum()) / frames,
             image=image / frames,
-            shape=weights.shape * float(betas @ betas),
+            shape=weights.shape * float(self._shape_information(weights) @ (betas - self.usual_shape) ** 2),
             placement=float(((height / weights.offset_spread) ** 2).sum()) / frames,
         )
 
@@ -79,6 +85,11 @@ class Problem:
         """One damped Gauss-Newton step of everything that is free."""
         sums = self.linearised(state, weights, surface)
         return self._moved(state, *sums.solve(self._free(weights), damping))
+
+    def frame_step(self, state: State, weights: Weights, surface: Surface, damping: float) -> np.ndarray:
+        """(F, 69) rad and m: the step of each frame on its own, with all that they share held."""
+        by_frame, _ = self.linearised(state, weights, surface).solve(np.zeros(0, dtype=np.intp), damping)
+        return by_frame
 
     def linearised(self, state: State, weights: Weights, surface: Surface) -> NormalEquations:
         """The normal equations at a state; their slope is half that of the cost summed over frames."""
@@ -98,6 +109,12 @@ class Problem:
         points = place_points(self.landmarks, forward(self.body, state.pose), state.pose.betas)
         gap = state.camera.project(points, self.seen.image_size) - self.pixels
         return float(np.median(np.linalg.norm(gap, axis=2)[self.in_image]))
+
+    def _shape_information(self, weights: Weights) -> np.ndarray:
+        """(S,) one over the variance of each shape coefficient about the usual: people's, or the video's error."""
+        information = np.ones(len(self.usual_shape))
+        information[: self.told_shape] = weights.video_shape**-2
+        return information
 
     def _bias(self, state: State, weights: Weights) -> float:
         """What the video's bias costs, once and not in every frame."""
@@ -203,9 +220,9 @@ class Problem:
 
     def _add_shared(self, sums: NormalEquations, state: State, surface: Surface, weights: Weights) -> None:
         """Priors of shape, of the video's bias, of each marker's height over the skin; damping of its slide."""
-        strength = len(self.target) * weights.shape
-        sums.h_ss[self.shape_at, self.shape_at] += strength * np.eye(self.shape_at.stop)
-        sums.g_s[self.shape_at] += strength * state.pose.betas
+        strength = len(self.target) * weights.shape * self._shape_information(weights)
+        sums.h_ss[self.shape_at, self.shape_at] += np.diag(strength)
+        sums.g_s[self.shape_at] += strength * (state.pose.betas - self.usual_shape)
         bias = np.radians(weights.bias_deg) ** -2
         sums.h_ss[self.bias_at, self.bias_at] += bias * np.eye(3 * len(FREE))
         sums.g_s[self.bias_at] += bias * bias_residual(state).ravel()
@@ -226,17 +243,23 @@ class Problem:
         free[self.placement_at] = weights.free_placement
         return np.flatnonzero(free)
 
+    @staticmethod
+    def turned(pose: Pose, by_frame: np.ndarray) -> Pose:
+        """The poses after a step (F, 69) of each frame."""
+        turns = by_frame[:, :-3].reshape(len(by_frame), len(FREE), 3).clip(-_LARGEST_TURN, _LARGEST_TURN)
+        rotations = pose.rotations.copy()
+        rotations[:, FREE] = rotations[:, FREE] @ exp_so3(turns)
+        trans = pose.trans + by_frame[:, -3:].clip(-_LARGEST_MOVE_M, _LARGEST_MOVE_M)
+        return replace(pose, rotations=rotations, trans=trans)
+
     def _moved(self, state: State, by_frame: np.ndarray, shared: np.ndarray) -> State:
         """The state after a step, no part of which goes further than the linearisation can be trusted."""
-        turns = by_frame[:, :-3].reshape(len(by_frame), len(FREE), 3).clip(-_LARGEST_TURN, _LARGEST_TURN)
-        rotations = state.pose.rotations.copy()
-        rotations[:, FREE] = rotations[:, FREE] @ exp_so3(turns)
-        trans = state.pose.trans + by_frame[:, -3:].clip(-_LARGEST_MOVE_M, _LARGEST_MOVE_M)
+        pose = self.turned(state.pose, by_frame)
         betas = state.pose.betas + shared[self.shape_at].clip(-1, 1)
         slide = shared[self.placement_at].clip(-_LARGEST_SLIDE_M, _LARGEST_SLIDE_M).reshape(-1, 3)
         turn, shift, zoom = np.split(shared[self.camera_at], [3, 6])
         return State(
-            Pose(rotations, trans, betas),
+            replace(pose, betas=betas),
             replace(state.placement, rest=state.placement.rest + slide),
             replace(
                 state.camera,
@@ -248,14 +271,15 @@ class Problem:
         )
 
 
-def _person_height(image: np.ndarray, seen: np.ndarray) -> float:
+def person_height(seen: Observations) -> float:
     """How tall the person stands in the landmarks, px, median over frames, at least 50.
 
     The extent changes as a person crouches; how well the network sees them does not.
     """
-    if not seen.any():
+    there = np.isfinite(seen.image).all(axis=2) & seen.tracked[:, None]
+    if not there.any():
         return 50.0
-    low = np.where(seen[..., None], image, np.inf).min(axis=1)
-    high = np.where(seen[..., None], image, -np.inf).max(axis=1)
+    low = np.where(there[..., None], seen.image, np.inf).min(axis=1)
+    high = np.where(there[..., None], seen.image, -np.inf).max(axis=1)
     size = np.linalg.norm((high - low)[np.isfinite(high - low).all(axis=1)], axis=1)
     return max(float(np.median(size)), 50.0)

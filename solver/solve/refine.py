@@ -1,4 +1,4 @@
-"""Every frame solved, with shape, marker placement and camera held: a few Gauss-Newton steps from the keyframes."""
+"""Every frame solved, with shape, marker placement and camera held, from the keyframes to those between."""
 
 from __future__ import annotations
 
@@ -7,15 +7,18 @@ from dataclasses import replace
 import numpy as np
 
 from solver.body.model import Body
-from solver.parallel import spread
-from solver.progress import Progress, silent
+from solver.progress import Progress, part_of, silent
 from solver.rotations import slerp
+from solver.solve.converge import Settled, settle
 from solver.solve.kinematics import Points, Pose, forward, place_points
-from solver.solve.problem import Problem
+from solver.solve.problem import person_height
+from solver.solve.residuals import marker_residual
 from solver.solve.state import Observations, State, Surface, Weights
 
-_CHUNK = 128
-_SPREADS = (0.02, 0.01, 0.01, 0.01)
+_STRIDES = (4, 2, 1)
+"""Every so many frames are solved first; those between start from what these found."""
+_WIDE = (0.02, 0.08)
+"""m, spread and kernel of the first step, and of the comparison of two starts."""
 
 
 def every_frame(
@@ -28,8 +31,8 @@ def every_frame(
     base: Weights,
     progress: Progress = silent,
     start: Pose | None = None,
-) -> Pose:
-    """Poses of all T frames.
+) -> Settled:
+    """Poses of all T frames, each iterated until it has settled (see ``converge``).
 
     Parameters
     ----------
@@ -38,23 +41,42 @@ def every_frame(
     fitted : the keyframes' solution
     start : poses of all frames to begin with; None carries the keyframes over
     """
-    frames = len(seen.markers)
+    count, person = len(seen.markers), person_height(seen)
     start = start or carried_over(body, seen, keyframes, fitted)
-    held = replace(base, free_shape=False, free_placement=False, free_camera=False, free_bias=False)
     rotations, trans = start.rotations.copy(), start.trans.copy()
+    settled, solved = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    for stride in _STRIDES:
+        todo = np.setdiff1d(np.union1d(np.arange(0, count, stride), count - 1), np.flatnonzero(solved))
+        if not len(todo):
+            continue
+        guess, some = start.at(todo), seen.at(todo)
+        if solved.any():
+            known = np.flatnonzero(solved)
+            between = replace(fitted, pose=Pose(rotations[known], trans[known], fitted.pose.betas))
+            guess = _nearer(body, some, fitted, base, guess, carried_over(body, seen, known, between).at(todo))
+        share = part_of(progress, solved.mean(), solved.mean() + len(todo) / count)
+        widest = () if solved.any() else (_WIDE,)
+        found = settle(body, some, landmarks, fitted, surface, base, guess, widest, share, person)
+        rotations[todo], trans[todo], settled[todo] = found.pose.rotations, found.pose.trans, found.settled
+        solved[todo] = True
+    return Settled(Pose(rotations, trans, fitted.pose.betas), settled)
 
-    def solve(first: int) -> None:
-        progress(first / frames, "solving every frame")
-        part = slice(first, min(first + _CHUNK, frames))
-        problem = Problem(body, seen.at(part), landmarks)
-        state = replace(fitted, pose=start.at(part))
-        for spread_m in _SPREADS:
-            weights = replace(held, marker=spread_m, marker_kernel=4 * spread_m)
-            state = problem.step(state, weights, surface, 1e-4)
-        rotations[part], trans[part] = state.pose.rotations, state.pose.trans
 
-    spread(solve, range(0, frames, _CHUNK))
-    return Pose(rotations, trans, fitted.pose.betas)
+def _nearer(body: Body, seen: Observations, fitted: State, base: Weights, first: Pose, second: Pose) -> Pose:
+    """Of two starts the one whose markers are nearer, frame by frame; the second where they are alike."""
+    weights = replace(base, marker=_WIDE[0], marker_kernel=_WIDE[1])
+    mine, other = (marker_cost(body, seen, fitted.placement, pose, weights) for pose in (first, second))
+    chosen = mine < other
+    rotations = np.where(chosen[:, None, None, None], first.rotations, second.rotations)
+    return Pose(rotations, np.where(chosen[:, None], first.trans, second.trans), second.betas)
+
+
+def marker_cost(body: Body, seen: Observations, placement: Points, pose: Pose, weights: Weights) -> np.ndarray:
+    """(T,) robust cost of each frame's markers."""
+    where = place_points(placement, forward(body, pose), pose.betas)
+    present = np.isfinite(seen.markers).all(axis=2)
+    target = np.where(present[..., None], seen.markers, 0.0)
+    return np.asarray(marker_residual(where, target, present, weights)[2].sum(axis=1))
 
 
 def carried_over(body: Body, seen: Observations, keyframes: np.ndarray, fitted: State) -> Pose:

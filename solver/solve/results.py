@@ -158,6 +158,9 @@ class FittedMotion:
     chosen : row of the candidate it was refined from
     confidence : 0..1
     warnings : in words
+    settled_deg : degrees, a further step would turn no joint of a settled frame by more; NaN where it was not iterated
+        so
+    settled : (T,) True where the frame's iteration came to that, None where it was not iterated so
     """
 
     time: np.ndarray
@@ -173,3 +176,5 @@ class FittedMotion:
     chosen: int
     confidence: float
     warnings: tuple[str, ...]
+    settled_deg: float = np.nan
+    settled: np.ndarray | None = None

@@ -27,6 +27,7 @@ class Observations:
     image : (N, L, 2) px of the body landmarks in the video, NaN = not seen
     visibility : (N, L) 0..1
     image_size : (width, height) px; (0, 0) without landmarks
+    shape : (B,) the first shape coefficients as the video has them, where it was told of a body of this kind
     """
 
     markers: np.ndarray
@@ -35,6 +36,7 @@ class Observations:
     image: np.ndarray
     visibility: np.ndarray
     image_size: tuple[int, int]
+    shape: np.ndarray | None = None
 
     def at(self, frames: np.ndarray | slice) -> Observations:
         """Some of the frames."""
@@ -112,6 +114,7 @@ class Weights:
     anatomical : share of the anatomical prior
     image : spread of a 2D landmark as a share of the person's height in the image
     shape : strength of the prior on betas and bone lengths, per frame of evidence
+    video_shape : spread of the video's shape coefficients, where it has any, in standard deviations among people
     offset, offset_spread : m, marker centre above the skin (9.5 mm: Ghorbani and Black 2021); the spread holds the
         marker's own 2 mm and what the shapes miss of a real skin
     slide : m, how far a marker may slide over the skin in one step
@@ -129,6 +132,7 @@ class Weights:
     image: float = 0.025
     image_kernel: float = 3.0
     shape: float = 1.0
+    video_shape: float = 0.7
     offset: float = 0.0095
     offset_spread: float = 0.006
     slide: float = 0.02

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from solver.clean.fill import METHODS, fill
 from solver.clean.fill.body import fill_by_body
-from solver.clean.fill.edm import from_distances
+from solver.clean.fill.edm import both_from_distances
 from solver.clean.fill.neighbours import neighbours_of
 from solver.clean.gaps import Fill, FillSettings, Gap, confidence_of, find_gaps
 from tests.clean.scenes import RATE, lose, rigid, soft, worst
@@ -84,7 +84,7 @@ def test_scaling_finds_a_point_from_distances_whatever_its_hand() -> None:
     rng = np.random.default_rng(3)
     points = rng.normal(size=(50, 7, 3))
     apart = points[:, :, None] - points[:, None]
-    found = from_distances((apart**2).sum(axis=3), points[:, 1:])
+    found, _, _ = both_from_distances((apart**2).sum(axis=3), points[:, 1:])
     assert worst(found, points[:, 0]) < 1e-7
 
 

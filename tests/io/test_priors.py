@@ -75,7 +75,7 @@ def test_phalp_takes_the_longest_real_track(tmp_path: Path, compress: int) -> No
     for joint in range(24):  # scipy's own slerp through the gap
         between = Slerp([4, 7], Rotation.from_matrix(prior.rotations[[4, 7], joint]))([5, 6]).as_matrix()
         np.testing.assert_allclose(prior.rotations[[5, 6], joint], between, atol=1e-6)
-    assert prior.betas is None
+    assert prior.betas is None, "all zero: it says no shape"
     assert any("4 of 12 frames were lost" in note for note in prior.notes)
 
 
@@ -322,3 +322,63 @@ def test_gvhmr_frames_differ_by_the_camera_alone(shared_data: Path, tmp_path: Pa
     apart = np.degrees((between.mean().inv() * between).magnitude())
     assert np.median(apart) < 5, f"{np.median(apart):.1f} degrees"
     assert camera.rotations[:, 0, 1, 1].mean() < -0.9 and world.rotations[:, 0, 1, 1].mean() < -0.9
+
+
+# the person's shape ---------------------------------------------------------------------------------------------------
+SHAPE = np.array([1.5, -2.0, 0.5, 0, 0.25, 0, 0, -0.75, 0, 1.0])
+
+
+def shaped(tmp_path: Path, program: str) -> Path:
+    """A file of each program whose person has a shape, told anew in every frame by those that do so."""
+    vectors, wobble = poses(), np.linspace(-0.3, 0.3, FRAMES)[:, None]
+    each = (SHAPE + wobble).astype(np.float32)
+    if program == "phalp":
+        turned = matrices(vectors)
+        file: dict[Any, Any] = {str(i): phalp_entry({1: (0, turned[i])}, i) for i in range(FRAMES)}
+        for i, entry in enumerate(file.values()):
+            entry["smpl"][0]["betas"] = each[i]
+        (tmp_path / "a.pkl").write_bytes(pickle.dumps(file))
+        return tmp_path / "a.pkl"
+    if program == "wham":
+        pose = {"pose": vectors.reshape(FRAMES, 72), "betas": each, "frame_ids": np.arange(FRAMES)}
+        (tmp_path / "a.pkl").write_bytes(pickle.dumps({0: pose}))
+        return tmp_path / "a.pkl"
+    if program == "gvhmr":
+        torch = pytest.importorskip("torch")
+        parameters = {"global_orient": vectors[:, 0], "body_pose": vectors[:, 1:22].reshape(FRAMES, 63), "betas": each}
+        torch.save({"smpl_params_incam": {k: torch.tensor(v) for k, v in parameters.items()}}, tmp_path / "a.pt")
+        return tmp_path / "a.pt"
+    if program == "tram":
+        np.save(tmp_path / "a.npy", {"pred_rotmat": matrices(vectors), "pred_shape": each}, allow_pickle=True)  # type: ignore[arg-type]
+        return tmp_path / "a.npy"
+    width = {"amass": 72, "amass smplh": 156, "amass smplx": 165}[program]
+    stored = np.zeros((FRAMES, width))
+    stored[:, :66] = vectors[:, :22].reshape(FRAMES, 66)
+    np.savez(tmp_path / "a.npz", poses=stored, betas=np.append(SHAPE, np.zeros(6)), mocap_frame_rate=30.0)
+    return tmp_path / "a.npz"
+
+
+@pytest.mark.parametrize(
+    ("program", "kind"),
+    [("phalp", "smpl"), ("wham", "smpl"), ("tram", "smpl"), ("gvhmr", "smplx"), ("amass", "smpl"),
+     ("amass smplh", "smplh"), ("amass smplx", "smplx")],
+)  # fmt: skip
+def test_the_shape_is_read_with_the_kind_of_body_it_belongs_to(tmp_path: Path, program: str, kind: str) -> None:
+    prior = load_prior(shaped(tmp_path, program))
+    assert prior.kind == kind and prior.betas is not None
+    assert np.abs(prior.betas - SHAPE).max() < 1e-5, "the median of what the frames say"
+    assert any("shape coefficients" in note and "--body" in note for note in prior.notes), prior.notes
+
+
+@pytest.mark.parametrize("odd", [{"betas": np.full(10, np.nan)}, {"betas": np.full(10, 50.0)}, {"betas": np.zeros(0)}])
+def test_a_shape_of_nobody_is_left_out_and_said(tmp_path: Path, odd: dict[str, Any]) -> None:
+    np.savez(tmp_path / "a.npz", poses=np.zeros((FRAMES, 72)), mocap_frame_rate=30.0, **odd)
+    prior = load_prior(tmp_path / "a.npz")
+    assert prior.betas is None and prior.kind == ""
+    assert any("shape coefficients" in note and "left out" in note for note in prior.notes)
+
+
+@pytest.mark.parametrize("mark", [{"bone_lengths": np.zeros(8)}, {"shaped": np.array(True)}])
+def test_the_shape_of_this_programs_own_body_is_not_taken_for_smpls(tmp_path: Path, mark: dict[str, Any]) -> None:
+    np.savez(tmp_path / "a.npz", poses=np.zeros((FRAMES, 72)), mocap_frame_rate=30.0, betas=SHAPE, **mark)
+    assert load_prior(tmp_path / "a.npz").betas is None

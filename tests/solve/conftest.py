@@ -71,6 +71,19 @@ def simulate(body: Body, seed: int, frames: int = 60, markers: int = 36, only: s
     return Scene(body, pose, links.place, body.weights[vertices].argmax(1), camera, seen, points)
 
 
+def drawn_vertices(body: Body, bones: np.ndarray, seed: int) -> np.ndarray:
+    """The vertices that ``simulate`` draws for the same seed and number of markers."""
+    rng = np.random.default_rng(seed)
+    for _ in range(12):
+        rng.uniform(0, 2 * np.pi), rng.uniform(1.5, 4)
+    rng.uniform(0, 6)
+    rng.normal(0, 0.7, body.shape_count)
+    index = np.flatnonzero(body.marker_mask)
+    vertices = rng.choice(index, len(bones), replace=False)
+    assert np.array_equal(body.weights[vertices].argmax(1), bones)
+    return vertices
+
+
 @pytest.fixture(scope="session")
 def free_body() -> Body:
     return with_bone_lengths(Body.load())

@@ -16,7 +16,7 @@ from solver.solve.confidence import movement_deg, stillness
 from solver.solve.problem import Problem
 from solver.solve.state import FREE, State, Weights
 from solver.solve.trust import believed, trusted
-from tests.solve.conftest import simulate
+from tests.solve.conftest import drawn_vertices, simulate
 
 BIASED = ("left_knee", "right_elbow", "spine2", "left_shoulder")
 
@@ -33,7 +33,7 @@ def solved(free_body: Body, bias_deg: float, seed: int) -> tuple[Problem, State,
     blind = np.full_like(scene.seen.image, np.nan)
     problem = Problem(free_body, replace(scene.seen, prior=prior, image=blind), scene.landmarks)
     weights = Weights(free_shape=False, anatomical=0.01, prior_deg=6.0, bias_deg=30.0)
-    vertices = _vertices(free_body, scene.bones, seed)
+    vertices = drawn_vertices(free_body, scene.bones, seed)
     guess = Hypothesis(
         vertices, scene.camera.R_lab_cam, scene.pose.trans + free_body.joints(scene.pose.betas)[0], 0, "", 0
     )
@@ -42,19 +42,6 @@ def solved(free_body: Body, bias_deg: float, seed: int) -> tuple[Problem, State,
     phases = (Phase(0.02, 0.1, 10, free_shape=False), Phase(0.01, 0.04, 8, free_placement=True, free_shape=False))
     state, _, _ = descend(problem, state, surface, phases, weights)
     return problem, state, weights, bias[FREE]
-
-
-def _vertices(body: Body, bones: np.ndarray, seed: int) -> np.ndarray:
-    """The vertices that ``simulate`` draws for the same seed and number of markers."""
-    rng = np.random.default_rng(seed)
-    for _ in range(12):
-        rng.uniform(0, 2 * np.pi), rng.uniform(1.5, 4)
-    rng.uniform(0, 6)
-    rng.normal(0, 0.7, body.shape_count)
-    index = np.flatnonzero(body.marker_mask)
-    vertices = rng.choice(index, len(bones), replace=False)
-    assert np.array_equal(body.weights[vertices].argmax(1), bones)
-    return vertices
 
 
 @pytest.mark.parametrize("seed", [1, 2])

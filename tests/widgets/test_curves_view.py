@@ -19,6 +19,7 @@ from widgets.panels.energy_bars import EnergyBar
 from widgets.panels.hypotheses import HypothesesView
 from widgets.panels.transport import Readout, Transport
 from widgets.plots.angle_data import AngleCurve, AnglePlot
+from widgets.plots.angle_plots import _broken
 from widgets.plots.convergence import ConvergenceView, EnergyCurve
 from widgets.plots.curves import CurvesView
 from widgets.plots.ink import pen, polyline
@@ -300,3 +301,11 @@ def test_a_dashed_line_has_gaps_and_a_solid_one_none_however_many_points(qapp: Q
     assert covered(False).all(), f"gaps in a solid line of {count} points"
     share = covered(True).mean()
     assert 0.35 < share < 0.8, f"{share:.0%} of a dashed line of {count} points is drawn"
+
+
+def test_a_curve_breaks_where_its_reading_jumps() -> None:
+    time = np.arange(6) / 10
+    curve = _broken("arm_flex_r", time, np.array([200.0, 230, -128, np.nan, -100, -90]), palette.RIGHT)
+    assert curve.time is not None and np.isfinite(curve.time).all() and (np.diff(curve.time) > 0).all()
+    assert np.isnan(curve.values).tolist() == [False, False, True, False, True, False, False]
+    assert curve.time[2] == pytest.approx(0.15)

@@ -18,6 +18,8 @@ from widgets.plots.scales import Scale, clock, limits, number, time_ticks
 from widgets.theme import colours
 
 OUT_OF_DATE = "out of date"
+_JUMP_DEG = 120.0
+"""A larger step between two frames is one of the reading, which came in again at the other end of its range."""
 _COLUMN_EM = 34.0
 """Lines of text that a column of plots is wide before there are two."""
 
@@ -181,8 +183,9 @@ class AnglePlots(QWidget):
             for curve in plot.curves:
                 ink = np.array(curve.colour, np.uint8)
                 if curve.reference is not None:
-                    draw_curve(painter, area, x, y, Curve("", curve.reference, ink, dashed=True), self._time)
-                own = Curve(curve.name, curve.degrees, ink, old=self._old)
+                    reference = _broken("", self._time, curve.reference, ink, dashed=True)
+                    draw_curve(painter, area, x, y, reference, self._time)
+                own = _broken(curve.name, self._time, curve.degrees, ink, old=self._old)
                 draw_curve(painter, area, x, y, own, self._time)
             painter.setClipping(False)
             if k + columns >= len(areas):
@@ -228,3 +231,12 @@ class AnglePlots(QWidget):
             QToolTip.showText(event.globalPos(), "\n".join(lines), self)
             return True
         return super().event(event)
+
+
+def _broken(
+    name: str, time: np.ndarray, degrees: np.ndarray, ink: Any, *, dashed: bool = False, old: bool = False
+) -> Curve:
+    """A curve that is interrupted where the reading jumps, instead of crossing the plot upright."""
+    after = np.flatnonzero(np.abs(np.diff(degrees)) > _JUMP_DEG) + 1
+    at, values = np.insert(time, after, (time[after - 1] + time[after]) / 2), np.insert(degrees, after, np.nan)
+    return Curve(name, values, ink, time=at, dashed=dashed, old=old)

@@ -13,6 +13,8 @@ _Y_UP = np.diag([1.0, -1, -1])
 """Turns a y-up world to a level camera's axes (x right, y down, z away)."""
 _Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 _AGAIN = "export the reconstruction again"
+_KINDS = {72: "smpl", 156: "smplh", 165: "smplx"}
+"""Whose body a row of rotation vectors belongs to, by its length; 66 are anybody's."""
 _RATES = ("mocap_frame_rate", "mocap_framerate", "fps")
 
 
@@ -36,9 +38,13 @@ def read_phalp(data: dict[Any, Any], where: str) -> Track:
         )
     last = max(max(per_frame) for per_frame in found.values())
     rotations = rotations_from_matrices(matrices, "smpl", where)
-    return _extended(
-        Track(rotations, np.array(frames), np.ones(len(frames), bool), notes=notes), max(last, len(data) - 1)
-    )
+    shapes = [found[person][f].get("betas") for f in frames]
+    sizes = {np.size(shape) for shape in shapes if isinstance(shape, np.ndarray)}
+    alike = len(sizes) == 1 and all(isinstance(shape, np.ndarray) for shape in shapes)
+    betas = np.stack([np.ravel(shape) for shape in shapes]) if alike else None
+    seen = np.ones(len(frames), bool)
+    track = Track(rotations, np.array(frames), seen, notes=notes, betas=betas, kind="smpl")
+    return _extended(track, max(last, len(data) - 1))
 
 
 def _real_entries(entry: Any, where: str) -> list[tuple[int, Any]]:
@@ -78,6 +84,8 @@ def _extended(track: Track, last: int) -> Track:
         np.append(track.frames, last),
         np.append(track.tracked, False),
         notes=track.notes,
+        betas=track.betas,
+        kind=track.kind,
     )
 
 
@@ -94,14 +102,15 @@ def read_wham(data: dict[Any, Any], where: str) -> Track:
         if len(data) > 1
         else ()
     )
-    return Track(rotations, frames, np.ones(len(frames), bool), notes=notes)
+    seen = np.ones(len(frames), bool)
+    return Track(rotations, frames, seen, notes=notes, betas=subject.get("betas"), kind="smpl")
 
 
 def read_tram(data: dict[Any, Any], where: str) -> Track:
     """TRAM: ``pred_rotmat`` (T, 24, 3, 3) in the camera's axes, and ``frame`` where it was seen."""
     rotations = rotations_from_matrices(numbers(data["pred_rotmat"], "pred_rotmat", where), "pred_rotmat", where)
     frames = _frames(data.get("frame"), "frame", len(rotations), where)
-    return Track(rotations, frames, np.ones(len(frames), bool))
+    return Track(rotations, frames, np.ones(len(frames), bool), betas=data.get("pred_shape"), kind="smpl")
 
 
 def read_gvhmr(data: dict[Any, Any], where: str) -> Track:
@@ -116,7 +125,9 @@ def read_gvhmr(data: dict[Any, Any], where: str) -> Track:
     if name == "smpl_params_global":
         rotations[:, 0] = _Y_UP @ rotations[:, 0]
         notes += ("The root is in a world frame (y up); the solver finds its rotation to the lab.",)
-    return Track(rotations, np.arange(len(rotations)), np.ones(len(rotations), bool), notes=notes)
+    seen = np.ones(len(rotations), bool)
+    betas = parameters.get("betas")
+    return Track(rotations, np.arange(len(rotations)), seen, notes=notes, betas=betas, kind="smplx")
 
 
 def read_amass(data: dict[str, Any], where: str) -> Track:
@@ -140,7 +151,11 @@ def read_amass(data: dict[str, Any], where: str) -> Track:
     rate = next((float(numbers(data[k], k, where).ravel()[0]) for k in _RATES if np.size(data.get(k, ())) == 1), None)
     time = numbers(data["time"], "time", where) if "time" in data else None
     rotations, note = _level(rotations, tracked)
-    return Track(rotations, np.arange(len(rotations)), tracked, rate, time, (note,))
+    kind = _KINDS.get(vectors.reshape(len(vectors), -1).shape[1], "")
+    if {"bone_lengths", "shaped"} & set(data):  # written by this program, of its own body
+        kind = ""
+    betas = data.get("betas") if kind else None
+    return Track(rotations, np.arange(len(rotations)), tracked, rate, time, (note,), betas, kind)
 
 
 def _level(rotations: np.ndarray, tracked: np.ndarray) -> tuple[np.ndarray, str]:

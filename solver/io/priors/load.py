@@ -27,8 +27,8 @@ def load_prior(path: str | Path, *, fps: float | None = None) -> PosePrior:
     Returns
     -------
     PosePrior
-        Its time is the frame's index over the frame rate. Shape coefficients are left out: they belong to SMPL
-        bodies and mean nothing on another. ``notes`` says what was assumed.
+        Its time is the frame's index over the frame rate. Shape coefficients come with the kind of body that they
+        belong to, and mean nothing on another. ``notes`` says what was assumed.
 
     Raises
     ------

@@ -16,6 +16,8 @@ from solver.rotations import exp_so3
 
 _MOST_FRAMES = 2_000_000
 _DEFAULT_RATE = 30.0
+_LARGEST_BETA = 10.0
+"""Standard deviations: nobody is shaped so."""
 _BODIES = (22, 24, 52, 55)
 """Joints of a bare body, of SMPL, SMPL-H and SMPL-X, the root among them."""
 _HANDS_FROM = 22
@@ -34,6 +36,8 @@ class Track:
     rate : Hz, where the file says it
     time : (N,) s, where the file says it
     notes : what was assumed, one sentence each
+    betas : shape coefficients as the file has them, (S,) or (N, S), None where it has none
+    kind : of the body that these belong to, see ``PosePrior``
     """
 
     rotations: np.ndarray
@@ -42,6 +46,8 @@ class Track:
     rate: float | None = None
     time: np.ndarray | None = None
     notes: tuple[str, ...] = field(default=())
+    betas: Any = None
+    kind: str = ""
 
 
 def numbers(value: Any, name: str, where: str) -> np.ndarray:
@@ -86,6 +92,28 @@ def rotations_from_matrices(matrices: np.ndarray, name: str, where: str) -> np.n
     return np.where(good[:, None, None, None], nearest, np.nan)
 
 
+def shape_of(track: Track, most: int = 10) -> tuple[np.ndarray | None, tuple[str, ...]]:
+    """(S,) the person's shape, S at most ``most``: the median over the tracked frames; and what is to be said of it."""
+    if track.betas is None:
+        return None, ()
+    found = np.asarray(track.betas)
+    if found.dtype.kind not in "fiu" or found.ndim not in (1, 2, 3) or not found.size:
+        return None, ("Its shape coefficients are no numbers and are left out.",)
+    rows = np.atleast_2d(found.reshape(-1, found.shape[-1]).astype(float))
+    if len(rows) == len(track.tracked):
+        rows = rows[track.tracked]
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    if not len(rows) or rows.shape[1] > 400 or np.abs(np.median(rows, axis=0)).max() > _LARGEST_BETA:
+        return None, ("Its shape coefficients are not of a person and are left out.",)
+    if not rows.any():  # what a file holds that says no shape
+        return None, ()
+    name = {"smpl": "SMPL", "smplh": "SMPL-H", "smplx": "SMPL-X"}[track.kind]
+    note = (
+        f"Its shape coefficients are those of an {name} body: they are used with --body and a body of that kind alone."
+    )
+    return np.median(rows, axis=0)[:most], (note,)
+
+
 def mark_invalid(track: Track) -> Track:
     """Frames whose numbers are no rotations count as lost, and are said to."""
     valid = np.isfinite(track.rotations).all(axis=(1, 2, 3))
@@ -115,12 +143,15 @@ def complete(track: Track, fps: float | None, where: str) -> PosePrior:
         time, rate_note = _clock(track.time, last + 1, where), ()
     lost = int((~tracked).sum())
     lost_note = (f"{lost} of {last + 1} frames were lost by the video and are filled in.",) if lost else ()
+    betas, shape_note = shape_of(track)
     return PosePrior(
+        betas=betas,
+        kind="" if betas is None else track.kind,
         rotations=fill_lost(rotations, tracked, time),
         tracked=tracked,
         time=time,
         source=where,
-        notes=(*track.notes, *lost_note, *rate_note),
+        notes=(*track.notes, *lost_note, *rate_note, *shape_note),
     )
 
 

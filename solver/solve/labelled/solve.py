@@ -16,6 +16,7 @@ from solver.errors import InputError
 from solver.markers import Markers
 from solver.progress import Progress, part_of, silent
 from solver.solve.bundle import Phase, descend
+from solver.solve.converge import Settled
 from solver.solve.ending import motion_from
 from solver.solve.kinematics import Pose
 from solver.solve.labelled.anchored import AnchoredProblem
@@ -157,13 +158,14 @@ def _first_stage(
     return state, surface, problem.energies(state, final, surface).total
 
 
-def _motion(body: Body, markers: Markers, places: Places, state: State, pose: Pose) -> FittedMotion:
+def _motion(body: Body, markers: Markers, places: Places, state: State, found: Settled) -> FittedMotion:
+    pose = found.pose
     vertex = Skin(body, pose.betas).nearest_vertex(state.placement.shaped(pose.betas))
     return motion_from(
         body,
         markers.positions,
         markers.time,
-        pose,
+        found,
         places.markers,
         state.placement,
         (places.bone, vertex),
