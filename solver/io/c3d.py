@@ -24,11 +24,10 @@ def read_c3d(path: str | Path, data: bytes | None = None) -> RawMarkers:
     positions = np.where(content.lost[..., None], np.nan, content.xyz)
     # Many programs write residual 0 throughout: only beside measured points does it say "filled".
     filled = content.computed if (~content.computed & ~content.lost).any() else None
-    rate = content.numbers("POINT", "RATE")[:1]
     return RawMarkers(
         positions=positions,
         labels=labels,
-        rate=float(rate[0]) if rate.size and rate[0] > 0 else content.rate,
+        rate=content.rate,
         first_frame=content.first_frame - 1,
         units=next(iter(content.text("POINT", "UNITS")), None),
         up=_vertical(content),
