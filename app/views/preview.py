@@ -100,7 +100,7 @@ def preview_of(
         subject=_owner(own),
         rate=markers.rate,
         rate_known=not problem,
-        units=_unit(settle_units(own.positions, own.units, units, str(path))[0]),
+        units=_unit(settle_units(own.positions, own.units, units, str(path), own.labels)[0]),
         units_declared=raw.units,
         up=_up_of(markers),
         up_declared=raw.up,

@@ -53,6 +53,7 @@ def clean_file(request: CleanRequest, progress: Progress = silent) -> Outcome:
     progress(0.9, "writing")
     write_markers(request.out, cleaned.markers)
     changes = changes_of(cleaned) | {"edits_made": made}
+    changes["notes"] = [*markers.notes, *changes["notes"]]
     about = {
         "program": f"markerscope {__version__}",
         "input": {"file": request.markers.name, "sha256": file_digest(request.markers)},
@@ -65,7 +66,6 @@ def clean_file(request: CleanRequest, progress: Progress = silent) -> Outcome:
     table = request.out.with_suffix(".changes.csv")
     write_text_atomic(table, csv_of(changes))
     lines = (
-        *markers.notes,
         *(f"Edit made: {sentence}" for sentence in made),
         *lines_of(changes),
         f"Written to {request.out}; every change is in {listed.name} and {table.name} beside it.",

@@ -12,6 +12,8 @@ from solver.io.text import read_bytes
 from solver.markers import UpAxis
 
 _MODEL_OUTPUTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "MODELED_MARKERS")
+_OWN_GROUPS = ("POINT", "ANALOG", "TRIAL", "FORCE_PLATFORM", "EVENT", "MANUFACTURER", "?")
+NOT_CARRIED = "not carried over into what is written"
 _AXES: dict[str, UpAxis] = {"X": "x", "Y": "y", "Z": "z"}
 
 
@@ -34,8 +36,28 @@ def read_c3d(path: str | Path, data: bytes | None = None) -> RawMarkers:
         filled=filled,
         subjects=tuple(name for name in content.text("SUBJECTS", "NAMES") if name),
         virtual=_computed(content, labels),
-        notes=content.notes,
+        notes=content.notes + besides(content),
     )
+
+
+def besides(content: C3DContent) -> tuple[str, ...]:
+    """What a file holds besides its points, which markers alone do not carry on."""
+    section = content.section
+    events = section.count("EVENT", "USED") or 0
+    plates = section.count("FORCE_PLATFORM", "USED") or 0
+    others = [key for key in section.values if key[0] not in _OWN_GROUPS]
+    held = (
+        (section.count("ANALOG", "USED") or 0, "analog channel"),
+        (plates, "force plate"),
+        (events, "event"),
+        (len(others), "further parameter"),
+    )
+    said = [f"{number} {noun}{'' if number == 1 else 's'}" for number, noun in held if number]
+    if not said:
+        return ()
+    listed = said[0] if len(said) == 1 else f"{', '.join(said[:-1])} and {said[-1]}"
+    verb = "is" if len(said) == 1 and listed.startswith("1 ") else "are"
+    return (f"{listed} of the C3D {verb} {NOT_CARRIED}.",)
 
 
 def _computed(content: C3DContent, labels: tuple[str, ...]) -> np.ndarray:

@@ -20,6 +20,8 @@ from solver.io.units import settle_units
 from solver.io.up_axis import settle_up
 from solver.markers import Markers, UpAxis
 
+_LEAST_HZ, _MOST_HZ = 1.0, 2000.0
+_LONGEST_S = 4 * 3600.0
 _NO_VALUE = 9999999.0  # what some programs write where there is none
 
 
@@ -72,8 +74,8 @@ def settled(
         raise InputError(f"{rate!r} is not a frame rate", "rate", "give it in Hz, for instance 100")
     raw = markers_of(raw, subject, path)
     positions = raw.positions
-    rate, rate_notes = _settle_rate(raw.rate, rate, path)
-    factor, unit_notes = settle_units(positions, raw.units, units, str(path))
+    rate, rate_notes = _settle_rate(raw.rate, rate, len(positions), path)
+    factor, unit_notes = settle_units(positions, raw.units, units, str(path), raw.labels)
     metres = positions * factor
     R_lab_internal, up_notes = settle_up(metres, raw, up)
     metres = _lost_as_nan(metres @ R_lab_internal)
@@ -172,13 +174,21 @@ def _lost_as_nan(positions: np.ndarray) -> np.ndarray:
     return np.where((odd | (positions == 0).all(axis=2))[..., None], np.nan, positions)
 
 
-def _settle_rate(found: float | None, wanted: float | None, path: str | Path) -> tuple[float, tuple[str, ...]]:
+def _settle_rate(
+    found: float | None, wanted: float | None, frames: int, path: str | Path
+) -> tuple[float, tuple[str, ...]]:
     found = found if found is not None and np.isfinite(found) and 0 < found < 1e6 else None
     if wanted is None and found is None:
         raise InputError("does not say its frame rate", path, "give the rate in Hz")
-    if wanted is None or found is None or wanted == found:
-        return wanted or found or 0.0, ()
-    return wanted, (f"The file says {found:g} Hz; {wanted:g} Hz was taken as asked.",)
+    if wanted is not None and found is not None and wanted != found:
+        rate, notes = wanted, (f"The file says {found:g} Hz; {wanted:g} Hz was taken as asked.",)
+    else:
+        rate, notes = wanted or found or 0.0, ()
+    if not _LEAST_HZ < rate <= _MOST_HZ:
+        notes += (f"A rate of {rate:g} Hz is no motion capture's (1 to 2000 Hz); check it, or give the rate in Hz.",)
+    if frames / rate > _LONGEST_S:
+        notes += (f"By its rate of {rate:g} Hz the recording lasts {frames / rate / 3600:.3g} hours; check the rate.",)
+    return rate, notes
 
 
 def _some(names: list[str] | tuple[str, ...], most: int = 8) -> str:
