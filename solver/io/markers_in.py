@@ -72,6 +72,7 @@ def settled(
         raise InputError(f"{up!r} is not a vertical axis", "up", "say x, y or z")
     if rate is not None and not (np.isfinite(rate) and rate > 0):
         raise InputError(f"{rate!r} is not a frame rate", "rate", "give it in Hz, for instance 100")
+    people = subjects_of(raw.labels, raw.subjects, raw.assets)
     raw = markers_of(raw, subject, path)
     positions = raw.positions
     rate, rate_notes = _settle_rate(raw.rate, rate, len(positions), path)
@@ -79,7 +80,7 @@ def settled(
     metres = positions * factor
     R_lab_internal, up_notes = settle_up(metres, raw, up)
     metres = _lost_as_nan(metres @ R_lab_internal)
-    labels = unique([without_prefix(label) for label in raw.labels])
+    labels = unique([without_prefix(label, people) for label in raw.labels])
     present = np.isfinite(metres).all(axis=2)
     unseen = [labels[m] for m in np.flatnonzero(~present.any(axis=0))]
     seen_notes = (f"Never seen: {_some(unseen)}.",) if unseen else ()
@@ -107,7 +108,7 @@ def markers_of(raw: RawMarkers, subject: str | None, path: str | Path) -> RawMar
 def list_subjects(path: str | Path) -> tuple[str, ...]:
     """Subjects in the file that ``load_markers`` can tell apart, in the file's order; empty where it names none."""
     raw = read_raw(path)
-    return subjects_of(raw.labels, raw.subjects)
+    return subjects_of(raw.labels, raw.subjects, raw.assets)
 
 
 @np.errstate(all="ignore")
@@ -125,14 +126,18 @@ def read_raw(path: str | Path) -> RawMarkers:
 
 def _one_subject(raw: RawMarkers, wanted: str | None, path: str | Path) -> RawMarkers:
     """The markers of one subject, and those that belong to nobody."""
-    choices = subjects_of(raw.labels, raw.subjects)
+    choices = subjects_of(raw.labels, raw.subjects, raw.assets)
     if wanted is not None and wanted not in choices:
         remedy = f"choose one of: {', '.join(choices)}" if choices else "leave the subject out, the file names none"
         raise InputError(f"holds no subject {wanted!r}", path, remedy)
-    owners = np.array([prefix(label) for label in raw.labels], dtype=object)
+    owners = np.array([head if (head := prefix(label)) in choices else "" for label in raw.labels], dtype=object)
     if len(choices) < 2:
         if len(raw.subjects) > 1 and not choices:
             note = f"The file lists {_some(raw.subjects)} but not whose each marker is; all were taken."
+            return replace(raw, notes=(*raw.notes, note))
+        things = tuple(dict.fromkeys(head for label in raw.labels if (head := prefix(label)) and head not in choices))
+        if len(things) > 1 and not raw.assets:
+            note = f"What stands before the colons ({_some(things)}) was not taken for people; all markers were kept."
             return replace(raw, notes=(*raw.notes, note))
         return raw
     seen = (np.isfinite(raw.positions).all(axis=2) & (raw.positions != 0).any(axis=2)).sum(axis=0)
@@ -181,14 +186,16 @@ def _settle_rate(
     if wanted is None and found is None:
         raise InputError("does not say its frame rate", path, "give the rate in Hz")
     if wanted is not None and found is not None and wanted != found:
-        rate, notes = wanted, (f"The file says {found:g} Hz; {wanted:g} Hz was taken as asked.",)
+        rate, notes = wanted, [f"The file says {found:g} Hz; {wanted:g} Hz was taken as asked."]
     else:
-        rate, notes = wanted or found or 0.0, ()
+        rate, notes = wanted or found or 0.0, []
     if not _LEAST_HZ < rate <= _MOST_HZ:
-        notes += (f"A rate of {rate:g} Hz is no motion capture's (1 to 2000 Hz); check it, or give the rate in Hz.",)
+        notes.append(f"A rate of {rate:g} Hz is no motion capture's (1 to 2000 Hz); check it, or give the rate in Hz.")
     if frames / rate > _LONGEST_S:
-        notes += (f"By its rate of {rate:g} Hz the recording lasts {frames / rate / 3600:.3g} hours; check the rate.",)
-    return rate, notes
+        notes.append(
+            f"By its rate of {rate:g} Hz the recording lasts {frames / rate / 3600:.3g} hours; check the rate."
+        )
+    return rate, tuple(notes)
 
 
 def _some(names: list[str] | tuple[str, ...], most: int = 8) -> str:

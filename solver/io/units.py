@@ -91,7 +91,8 @@ def size_doubt(size: float | None, factor: float, named: str, labels: Sequence[s
     if least <= size * factor <= _MOST_M:
         return ()
     likely = min(_COMMON, key=lambda unit: abs(math.log(size * _METRES[unit] / _PERSON_M)))
-    what = f"In {named} the markers span {_length(size * factor)}, which is no person"
+    strange = "which is no person" if not _LEAST_M <= size * factor <= _MOST_M else "little for a body with these names"
+    what = f"In {named} the markers span {_length(size * factor)}, {strange}"
     if not least <= size * _METRES[likely] <= _MOST_M:
         return (f"{what}; check the unit.",)
     return (f"{what}; check the unit: in {likely} they would span {_length(size * _METRES[likely])}.",)
