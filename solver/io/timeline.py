@@ -73,7 +73,7 @@ def even_grid(
         return (
             _gridded(by_frame, declared, first, notes) if by_frame is not None else _even(rows, declared, first, notes)
         )
-    time, unit_notes = _in_seconds(time, declared, unit_known)
+    time, unit_notes = in_seconds(time, declared, unit_known=unit_known)
     notes += unit_notes
     if by_frame is not None:
         found = _by_frames(time, by_frame, declared)
@@ -124,8 +124,16 @@ def _frame_steps(frame: np.ndarray | None) -> tuple[np.ndarray | None, tuple[str
     return np.maximum(np.round(steps / stride), 1), ()
 
 
-def _in_seconds(time: np.ndarray, declared: float | None, unit_known: bool) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Time in s from 0 or the file's own start, by a unit that makes the rate a possible one."""
+def in_seconds(
+    time: np.ndarray, declared: float | None, *, unit_known: bool = False
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Ascending times (rows,) in s, and what was assumed: a unit that makes the rate a possible one.
+
+    Parameters
+    ----------
+    declared : Hz, where something else says the rate
+    unit_known : whether the times are known to be in s; a clock that counts from a date starts at 0 all the same
+    """
     gaps = np.diff(time)
     rate = float(1 / np.median(gaps[gaps > 0]))
     notes: tuple[str, ...] = ()
