@@ -20,6 +20,7 @@ from solver.body.skeleton import BONES, JOINTS, PARENTS
 from solver.errors import InputError
 from solver.filling import filled_by_body
 from solver.io.atomic import cannot_write, make_folder, write_text_atomic
+from solver.io.c3d_keep import Original
 from solver.io.camera import FILE_NAME as CAMERA
 from solver.io.camera import write_camera
 from solver.io.export_smpl import write_smpl_npz
@@ -63,8 +64,10 @@ STANDARD = tuple(name for name in FORMATS if name != "angles_long")
 _STAMP = "outputs.json"
 
 
-def write_outputs(session: Session, graph: GraphRun) -> None:
+def write_outputs(session: Session, graph: GraphRun) -> tuple[str, ...]:
     """Write every output file, unless they are there as they were written from the same results.
+
+    Returns what of the marker file's other sections could not be kept in a C3D, one sentence each.
 
     They are made in a folder of their own first: where that fails, none of them is touched.
 
@@ -76,11 +79,11 @@ def write_outputs(session: Session, graph: GraphRun) -> None:
     stamp = session.store.root / _STAMP
     known = _read(stamp)
     if known.get("from") == about and _as_written(session.folder, known.get("files")):
-        return
+        return tuple(known.get("notes", ()))
     # A name that the store clears away, whatever ends this process.
     staging = make_folder(session.store.root / "outputs" / f".tmp-{os.getpid()}-{secrets.token_hex(4)}")
     try:
-        _write(staging, session, graph, about)
+        notes = _write(staging, session, graph, about)
         made = {path.name: file_digest(path) for path in sorted(staging.iterdir())}
         stamp.unlink(missing_ok=True)
         _move(staging, session.folder, set(made))
@@ -88,7 +91,8 @@ def write_outputs(session: Session, graph: GraphRun) -> None:
         shutil.rmtree(staging, ignore_errors=True)
         with suppress(OSError):
             staging.parent.rmdir()
-    write_text_atomic(stamp, json.dumps({"from": about, "files": made}, indent=1) + "\n")
+    write_text_atomic(stamp, json.dumps({"from": about, "files": made, "notes": notes}, indent=1) + "\n")
+    return notes
 
 
 def _read(stamp: Path) -> dict[str, Any]:
@@ -164,13 +168,14 @@ def _write(
     about: Mapping[str, Any],
     formats: Collection[str] = STANDARD,
     pictures: Sequence[Picture] = (),
-) -> None:
+) -> tuple[str, ...]:
+    """Write the formats into a folder of their own, and say what of the marker file's C3D could not be kept."""
     from solver.angles import evidence
     from solver.body.bones import with_bone_lengths
     from solver.body.model import Body
+    from solver.io.c3d_keep import kept_or_plain
     from solver.io.export_angles import angles_long_csv, write_angles
     from solver.io.export_bvh import write_bvh
-    from solver.io.export_c3d import write_c3d
     from solver.io.export_mot import write_mot
     from solver.io.export_trc import write_trc
     from solver.report_of import report_of
@@ -179,6 +184,7 @@ def _write(
     body_file = session.inputs.get("body_file")
     body = with_bone_lengths(Body.load(body_file.path if body_file else None))
     named = labelled(markers, motion)
+    not_kept: tuple[str, ...] = ()
     if "angles" in formats or "angles_long" in formats:  # the long form, too, has its convention beside it
         write_angles(folder, angles, about, evidence(angles.convention, motion.marker_joint))
     if "angles_long" in formats:
@@ -190,7 +196,7 @@ def _write(
     if "camera" in formats and motion.camera.image_size != (0, 0):
         write_camera(folder / CAMERA, motion.camera)
     if "c3d" in formats:
-        write_c3d(folder / "markers_labelled.c3d", named)
+        not_kept = kept_or_plain(folder / "markers_labelled.c3d", named, _original(session), named.labels)
     if "trc" in formats:
         write_trc(folder / "markers_labelled.trc", named)
     if "bvh" in formats:
@@ -199,6 +205,16 @@ def _write(
         write_bvh(folder / "motion.bvh", JOINTS, PARENTS, offsets, motion.rotations, motion.joints[:, 0], markers.rate)
     if "report" in formats:
         report_of(folder / "report.html", session, graph, named, about, pictures)
+    return not_kept
+
+
+def _original(session: Session) -> Original | None:
+    """The marker file, whose other sections a C3D keeps; None where it is not there as it was read."""
+    file = session.inputs.get("marker_file")
+    if file is None or not file.path.is_file() or file_digest(file.path) != file.digest:
+        return None
+    settings = session.stage_settings(graph_of(session))["markers"]
+    return Original(file.path, settings.units, settings.subject)
 
 
 def write_motion(path: Path, markers: Markers, motion: FittedMotion, betas_count: int) -> None:

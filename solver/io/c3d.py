@@ -13,7 +13,6 @@ from solver.markers import UpAxis
 
 _MODEL_OUTPUTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "MODELED_MARKERS")
 _OWN_GROUPS = ("POINT", "ANALOG", "TRIAL", "FORCE_PLATFORM", "EVENT", "MANUFACTURER", "?")
-NOT_CARRIED = "not carried over into what is written"
 _AXES: dict[str, UpAxis] = {"X": "x", "Y": "y", "Z": "z"}
 
 
@@ -36,12 +35,13 @@ def read_c3d(path: str | Path, data: bytes | None = None) -> RawMarkers:
         filled=filled,
         subjects=tuple(name for name in content.text("SUBJECTS", "NAMES") if name),
         virtual=_computed(content, labels),
+        points=np.arange(count),
         notes=content.notes + besides(content),
     )
 
 
 def besides(content: C3DContent) -> tuple[str, ...]:
-    """What a file holds besides its points, which markers alone do not carry on."""
+    """What a file holds besides its points: only a C3D written from it carries that on."""
     section = content.section
     events = section.count("EVENT", "USED") or 0
     plates = section.count("FORCE_PLATFORM", "USED") or 0
@@ -56,8 +56,7 @@ def besides(content: C3DContent) -> tuple[str, ...]:
     if not said:
         return ()
     listed = said[0] if len(said) == 1 else f"{', '.join(said[:-1])} and {said[-1]}"
-    verb = "is" if len(said) == 1 and listed.startswith("1 ") else "are"
-    return (f"{listed} of the C3D {verb} {NOT_CARRIED}.",)
+    return (f"The C3D also holds {listed}: kept where a C3D is written from it, left out of every other format.",)
 
 
 def _computed(content: C3DContent, labels: tuple[str, ...]) -> np.ndarray:

@@ -27,12 +27,14 @@ class Record:
     identity : negative for a group, else of the group that the parameter belongs to
     raw : bytes of the name as they stand there (a minus before its length, which locks it, is in ``locked``)
     content : bytes after the link to the next record
+    at : byte of the file at which the content begins
     """
 
     identity: int
     raw: bytes
     content: bytes
     locked: bool = False
+    at: int = 0
 
     @property
     def name(self) -> str:
@@ -75,10 +77,20 @@ class Section:
             found += value
         return tuple(found)
 
+    def text_of(self, group: str, name: str) -> tuple[str, ...]:
+        """Text of one parameter, empty where absent."""
+        value = self.values.get((group, name))
+        return value if isinstance(value, tuple) else ()
+
     def numbers(self, group: str, name: str) -> np.ndarray:
         """Numbers of a parameter, empty where absent."""
         value = self.values.get((group, name))
         return value if isinstance(value, np.ndarray) else np.zeros(0)
+
+    def record(self, group: str, name: str) -> Record | None:
+        """The record of a parameter, None where absent."""
+        identities = {-record.identity for record in self.records if record.identity < 0 and record.name == group}
+        return next((r for r in self.records if r.identity in identities and r.name == name), None)
 
     def count(self, group: str, name: str) -> int | None:
         """A count of 16 bits without sign, None where absent."""
@@ -128,7 +140,7 @@ def read_section(data: bytes, path: str | Path) -> Section:
             broken = clean(section[at + 2 : link]).upper() or "?"
             break
         raw = section[at + 2 : link]
-        records.append(Record(identity, raw, section[link + 2 : stop], length < 0))
+        records.append(Record(identity, raw, section[link + 2 : stop], length < 0, start + link + 2))
         if offset == 0:
             break
         at = stop
@@ -205,6 +217,70 @@ def floats(raw: bytes, order: str, dec: bool) -> np.ndarray:
         return np.frombuffer(raw, order + "f4").astype(float)
     words = np.frombuffer(raw, "<u2").reshape(-1, 2)[:, ::-1]
     return np.ascontiguousarray(words).view("<f4").ravel().astype(float) / 4
+
+
+def from_floats(values: np.ndarray, order: str, dec: bool) -> bytes:
+    """The bytes of 32-bit floats, as ``floats`` reads them."""
+    if not dec:
+        return values.astype(order + "f4").tobytes()
+    words = np.ascontiguousarray(values * 4, dtype="<f4").view("<u2").reshape(-1, 2)[:, ::-1]
+    return np.ascontiguousarray(words).tobytes()
+
+
+def with_numbers(content: bytes, values: np.ndarray, order: str, dec: bool) -> bytes:
+    """A parameter's content with other numbers of the same kind and shape; whole ones take 16 bits without sign.
+
+    Raises
+    ------
+    ValueError : the parameter holds text, or another number of values
+    """
+    kind, rank = struct.unpack_from("bB", content)
+    shape = tuple(content[2 : 2 + rank])
+    if kind not in (2, 4) or int(np.prod(shape, dtype=np.int64)) != values.size:
+        raise ValueError("a parameter is not of the kind that its numbers want")
+    begin = 2 + rank
+    whole = (np.round(values).astype(np.int64) % 65536).astype(order + "u2").tobytes()
+    raw = from_floats(values.astype(float), order, dec) if kind == 4 else whole
+    return content[:begin] + raw + content[begin + len(raw) :]
+
+
+def with_texts(content: bytes, texts: tuple[str, ...]) -> bytes:
+    """A parameter's content with other texts, as wide as the longest; its description stays."""
+    _, rank = struct.unpack_from("bB", content)
+    shape = tuple(content[2 : 2 + rank])
+    rest = content[2 + rank + int(np.prod(shape, dtype=np.int64)) :]
+    encoded = [text.encode("utf-8") for text in texts]
+    width = max([*map(len, encoded), shape[0] if rank else 1, 1])
+    if width > 255 or len(encoded) > 255:
+        raise ValueError("texts do not fit a parameter")
+    return struct.pack("b3B", -1, 2, width, len(encoded)) + b"".join(e.ljust(width) for e in encoded) + rest
+
+
+def section_bytes(section: Section, head: bytes, contents: Mapping[int, bytes], room: int) -> bytes:
+    """The section written anew, some records with other contents, in at least ``room`` blocks.
+
+    Parameters
+    ----------
+    head : the section's first two bytes
+    contents : by the record's place in the list
+
+    Raises
+    ------
+    ValueError : it takes more than 255 blocks, or a record more than its link can say
+    """
+    body = b""
+    for i, record in enumerate(section.records):
+        content = contents.get(i, record.content)
+        if len(content) + 2 > 65535:
+            raise ValueError(f"the parameter {record.name} is too large")
+        length = -len(record.raw) if record.locked else len(record.raw)
+        body += struct.pack("bb", length, record.identity) + record.raw
+        body += struct.pack(section.order + "H", len(content) + 2) + content
+    body += b"\0\0"
+    blocks = max(room, -(-(4 + len(body)) // BLOCK))
+    if blocks > 255:
+        raise ValueError("the parameters take more than 255 blocks")
+    return (head + bytes([blocks, section.processor]) + body).ljust(blocks * BLOCK, b"\0")
 
 
 def clean(raw: bytes) -> str:

@@ -115,13 +115,17 @@ def list_subjects(path: str | Path) -> tuple[str, ...]:
 def read_raw(path: str | Path) -> RawMarkers:
     """What a file holds, as it stands there: before units, axes, rate and subject are settled."""
     data = read_bytes(path)
-    suffix = Path(path).suffix.lower()
-    if (suffix == ".c3d" and b"\0" in data[:512]) or looks_like_c3d(data):
+    if is_c3d(data, path):
         return read_c3d(path, data)
     text = decode(data, path)
-    if looks_like_trc(text) or suffix == ".trc":
+    if looks_like_trc(text) or Path(path).suffix.lower() == ".trc":
         return apply_filled_list(read_trc(path, text), path)
     return read_table(path, text)
+
+
+def is_c3d(data: bytes, path: str | Path) -> bool:
+    """Whether a file is a C3D, by what it holds; one that is damaged at its very start, by its name."""
+    return looks_like_c3d(data) or (Path(path).suffix.lower() == ".c3d" and b"\0" in data[:512])
 
 
 def _one_subject(raw: RawMarkers, wanted: str | None, path: str | Path) -> RawMarkers:
@@ -170,6 +174,7 @@ def _select(raw: RawMarkers, keep: np.ndarray) -> RawMarkers:
         labels=tuple(label for label, kept in zip(raw.labels, keep, strict=True) if kept),
         filled=None if raw.filled is None else raw.filled[:, keep],
         virtual=None if raw.virtual is None else raw.virtual[keep],
+        points=None if raw.points is None else raw.points[keep],
     )
 
 

@@ -27,6 +27,7 @@ class RawMarkers:
     subjects : names of subjects the file lists apart from the labels
     assets : prefixes of labels that name a thing with markers on it, not a person
     virtual : (M,) True where the file itself lists a point as computed, not a marker
+    points : (M,) number of each marker among the file's points, None where that says nothing
     notes : what was assumed or left out so far, one sentence each
     """
 
@@ -42,4 +43,5 @@ class RawMarkers:
     subjects: tuple[str, ...] = ()
     assets: tuple[str, ...] = ()
     virtual: np.ndarray | None = None
+    points: np.ndarray | None = None
     notes: tuple[str, ...] = ()
