@@ -9,7 +9,8 @@ import numpy as np
 
 from solver.errors import InputError
 from solver.io.raw import RawMarkers
-from solver.io.table_columns import Columns, find_columns
+from solver.io.table_columns import Columns, find_columns, find_long_columns
+from solver.io.table_long import widen
 from solver.io.table_sheet import Sheet, cut, times_of_day
 from solver.io.text import decode, is_number, number, number_table, read_bytes, split_lines, thousands_mark
 from solver.io.timeline import even_grid
@@ -33,6 +34,9 @@ def read_table(path: str | Path, text: str | None = None) -> RawMarkers:
         if len(sheet.rows) > 1 and len(sheet.rows[-1]) < max(map(len, sheet.rows[:-1])):
             raise InputError(f"is cut off in line {len(lines)}", path, "copy or export it again")
     sheet = _with_row_names(sheet)
+    long = None if sheet.names else find_long_columns(sheet.header)
+    if long is not None:
+        sheet = widen(sheet, long, path)
     columns = _qualisys_columns(sheet) if sheet.names else find_columns(sheet.header)
     if columns is None:
         remedy = "name the columns like C7_x, C7_y, C7_z, or put a row of names above a row of X, Y, Z"

@@ -36,6 +36,18 @@ _MARKER_TYPES = (
     "Trained Markerset Marker",
     "Unlabeled",
 )
+_NAME_TITLES = (
+    "marker",
+    "markers",
+    "name",
+    "label",
+    "point",
+    "bodypart",
+    "landmark",
+    "joint",
+    "marker_name",
+    "keypoint",
+)
 _PEOPLE = ("individuals", "individual", "subjects", "subject", "person", "people")
 
 
@@ -64,6 +76,27 @@ class Columns:
     filled: dict[str, int] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
     assets: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class LongColumns:
+    """Where a table with a row for each marker and frame keeps them: columns of name, x, y, z, time and frame."""
+
+    name: int
+    xyz: tuple[int, int, int]
+    time: int | None = None
+    frame: int | None = None
+
+
+def find_long_columns(header: Sequence[Sequence[str]]) -> LongColumns | None:
+    """Columns of a table in long form, None where it is none."""
+    for row in reversed(header):
+        said = [cell.lower() for cell in row]
+        at = next((k for k, cell in enumerate(said) if cell in _NAME_TITLES), None)
+        if at is not None and all(said.count(axis) == 1 for axis in "xyz"):
+            time, frame, _ = _clock([row])
+            return LongColumns(at, (said.index("x"), said.index("y"), said.index("z")), time, frame)
+    return None
 
 
 def find_columns(header: Sequence[Sequence[str]]) -> Columns | None:
@@ -247,9 +280,9 @@ def _flat(row: Sequence[str], below: Sequence[Sequence[str]] = ()) -> Columns | 
             break
     else:
         return None
+    if any(_POSITION.search(name) for name, _ in groups):  # D-Flow: turns and forces stand beside the positions
+        groups = [(_POSITION.sub("", name), axes) for name, axes in groups if _POSITION.search(name)]
     names = [name for name, _ in groups]
-    if all(_POSITION.search(name) for name in names):
-        names = [_POSITION.sub("", name) for name in names]
     flags = {name: row.index(f"{name}_filled") for name in names if f"{name}_filled" in row}
     xyz = tuple((axes["x"], axes["y"], axes["z"]) for _, axes in groups)
     for line in below:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from solver.io.text import clock_seconds, is_number, number, refuse_ragged_blanks, split_cells
+from solver.io.text import SEPARATORS, clock_seconds, is_number, number, refuse_ragged_blanks, split_cells
 
 _REMARK = ("#", "%", "//")
 _LOOK_AHEAD = 3
@@ -179,6 +179,9 @@ def _body(
             continue
         if line.startswith("#") and not is_number(cells[0]):
             continue
+        if rows and _words(line, cells, len(rows[-1])):
+            notes += (f"A line of words below the first data (line {i}) was passed over.",)
+            continue
         for at, blank in lost:
             if rows and len(blank) == len(rows[-1]):
                 rows.append(blank)
@@ -188,6 +191,12 @@ def _body(
         rows.append(cells)
         numbers.append(i)
     return rows, numbers, notes
+
+
+def _words(line: str, cells: Sequence[str], width: int) -> bool:
+    """Whether a line is a sentence, not a row: nothing parts its cells, and none is a number."""
+    parted = any(mark in line for mark in SEPARATORS)
+    return not parted and 3 < width > len(cells) and not any(map(is_number, cells))
 
 
 def _goes_on(lines: Sequence[str], at: int, rows: Sequence[Sequence[str]]) -> bool:

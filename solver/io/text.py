@@ -76,12 +76,20 @@ def split_cells(line: str) -> list[str]:
             break
     else:
         return line.split()
+    if separator == "," and " " in line and _decimal_commas(cells := line.split()):
+        return cells
     if '"' in line:
         try:
             return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
         except (csv.Error, StopIteration):
             pass
     return [cell.strip() for cell in line.split(separator)]
+
+
+def _decimal_commas(cells: Sequence[str]) -> bool:
+    """Whether cells that blanks part are numbers with decimal commas, so that no comma parts any."""
+    commas = sum(_DECIMAL_COMMA.fullmatch(cell) is not None for cell in cells)
+    return len(cells) > 1 and commas > 0 and all("," not in c or _DECIMAL_COMMA.fullmatch(c) for c in cells)
 
 
 def refuse_ragged_blanks(line: str, cells: list[str], rows: list[list[str]], at: int, path: str | Path) -> None:

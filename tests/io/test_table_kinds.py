@@ -133,6 +133,24 @@ KINDS: dict[str, Callable[[np.ndarray], str]] = {
         [["TimeStamp", "FrameNumber", *[f"{n}.Pos{a}" for n in NAMES for a in "XYZ"]],
          *[[row[0], str(5000 + t), *row[1:]] for t, row in enumerate(timed(cells(x)))]], "\t"
     ),
+    "D-Flow with turns": lambda x: table(
+        [["TimeStamp", *[f"{n}.{k}{a}" for n in NAMES for k in ("Pos", "Rot") for a in "XYZ"]],
+         *[[row[0], *[c for i in range(6) for c in (*row[3 * i + 1 : 3 * i + 4], "1.5", "2.5", "3.5")]]
+           for row in timed(cells(x))]], "\t"
+    ),
+    "blanks and decimal commas": lambda x: table(
+        [["time", *flat()], *[[c.replace(".", ",") for c in row] for row in timed(cells(x, "NaN"))]], " "
+    ),
+    "a footer": lambda x: table([["time", *flat()], *timed(cells(x)), [], ["written by somebody"]]),
+    "long": lambda x: table(
+        [["time", "marker", "x", "y", "z"],
+         *[[row[0], n, *row[3 * i + 1 : 3 * i + 4]] for row in timed(cells(x)) for i, n in enumerate(NAMES)]]
+    ),
+    "long, marker by marker": lambda x: table(
+        [["frame", "time", "name", "X", "Y", "Z"],
+         *[[str(t), row[0], n, *row[3 * i + 1 : 3 * i + 4]]
+           for i, n in enumerate(NAMES) for t, row in enumerate(timed(cells(x)))]]
+    ),
     "milliseconds": lambda x: table([["time", *flat()], *[[str(10 * t), *row] for t, row in enumerate(cells(x))]]),
 }  # fmt: skip
 for _lost in ("#N/A", "-1.#IND", "1.#QNAN00", "-nan(ind)", "nan(ind)", "<NA>", "NULL", "NaN", "n/a", "---", "-1,#IND"):
