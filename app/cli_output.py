@@ -42,7 +42,8 @@ class Terminal:
             for warning in outcome.warnings:
                 print(f"Warning: {shown(warning)}")
         if self._json:
-            print(json_line(outcome.summary))
+            said = {"warnings": list(outcome.warnings)} if outcome.warnings else {}
+            print(json_line(said | dict(outcome.summary)))
         sys.stdout.flush()
 
     def _clear(self) -> None:

@@ -18,6 +18,7 @@ from solver.angles import world_rotations
 from solver.body.skeleton import BONES, JOINTS, PARENTS
 from solver.filling import filled_by_body
 from solver.io.atomic import write_text_atomic
+from solver.io.c3d_keep import Original
 from solver.io.camera import FILE_NAME as CAMERA
 from solver.io.camera import write_camera
 from solver.io.export_smpl import write_smpl_npz
@@ -63,8 +64,10 @@ STANDARD = tuple(name for name in FORMATS if name != "angles_long")
 _STAMP = "outputs.json"
 
 
-def write_outputs(session: Session, graph: GraphRun) -> None:
+def write_outputs(session: Session, graph: GraphRun) -> tuple[str, ...]:
     """Write every output file, unless they are there as they were written from the same results.
+
+    Returns what of the marker file's other sections could not be kept in a C3D, one sentence each.
 
     They are made in a folder of their own first: where that fails, none of them is touched.
 
@@ -76,16 +79,17 @@ def write_outputs(session: Session, graph: GraphRun) -> None:
     stamp = session.store.root / _STAMP
     known = _read(stamp)
     if known.get("from") == about and _as_written(session.folder, known.get("files")):
-        return
+        return tuple(known.get("notes", ()))
     # A name that the store clears away, whatever ends this process.
     staging = session.store.root / "outputs" / f".tmp-{os.getpid()}-{secrets.token_hex(4)}"
     with together(session.folder, (*FILES, *SOMETIMES), staging) as place:
-        _write(place, session, graph, about)
+        notes = _write(place, session, graph, about)
         made = {path.name: file_digest(path) for path in sorted(place.iterdir())}
         stamp.unlink(missing_ok=True)
     with suppress(OSError):
         staging.parent.rmdir()
-    write_text_atomic(stamp, json.dumps({"from": about, "files": made}, indent=1) + "\n")
+    write_text_atomic(stamp, json.dumps({"from": about, "files": made, "notes": notes}, indent=1) + "\n")
+    return notes
 
 
 def _read(stamp: Path) -> dict[str, Any]:
@@ -134,13 +138,14 @@ def _write(
     about: Mapping[str, Any],
     formats: Collection[str] = STANDARD,
     pictures: Sequence[Picture] = (),
-) -> None:
+) -> tuple[str, ...]:
+    """Write the formats into a folder of their own, and say what of the marker file's C3D could not be kept."""
     from solver.angles import evidence
     from solver.body.bones import with_bone_lengths
     from solver.body.model import Body
+    from solver.io.c3d_keep import kept_or_plain
     from solver.io.export_angles import angles_long_csv, write_angles
     from solver.io.export_bvh import write_bvh
-    from solver.io.export_c3d import write_c3d
     from solver.io.export_mot import write_mot
     from solver.io.export_trc import write_trc
     from solver.report_of import report_of
@@ -151,6 +156,7 @@ def _write(
     if body_file is not None and body_file.digest and file_digest(body_file.path) != body_file.digest:
         raise changed(body_file.path)
     named = labelled(markers, motion)
+    not_kept: tuple[str, ...] = ()
     if "angles" in formats or "angles_long" in formats:  # the long form, too, has its convention beside it
         write_angles(folder, angles, about, evidence(angles.convention, motion.marker_joint))
     if "angles_long" in formats:
@@ -162,7 +168,7 @@ def _write(
     if "camera" in formats and motion.camera.image_size != (0, 0):
         write_camera(folder / CAMERA, motion.camera)
     if "c3d" in formats:
-        write_c3d(folder / "markers_labelled.c3d", named)
+        not_kept = kept_or_plain(folder / "markers_labelled.c3d", named, _original(session), named.labels)
     if "trc" in formats:
         write_trc(folder / "markers_labelled.trc", named)
     if "bvh" in formats:
@@ -171,6 +177,16 @@ def _write(
         write_bvh(folder / "motion.bvh", JOINTS, PARENTS, offsets, motion.rotations, motion.joints[:, 0], markers.rate)
     if "report" in formats:
         report_of(folder / "report.html", session, graph, named, about, pictures)
+    return not_kept
+
+
+def _original(session: Session) -> Original | None:
+    """The marker file, whose other sections a C3D keeps; None where it is not there as it was read."""
+    file = session.inputs.get("marker_file")
+    if file is None or not file.path.is_file() or file_digest(file.path) != file.digest:
+        return None
+    settings = session.stage_settings(graph_of(session))["markers"]
+    return Original(file.path, settings.units, settings.subject)
 
 
 def write_motion(path: Path, markers: Markers, motion: FittedMotion, betas_count: int) -> None:

@@ -135,7 +135,12 @@ def test_what_was_found_is_printed_and_json_is_the_last_line(markers: Path, tmp_
     assert main(["solve", str(markers), "--out", str(tmp_path / "out"), "--json"], Fake().services) == 0
     printed = capsys.readouterr()
     assert printed.out.splitlines()[:2] == ["47 markers on 14 bones.", "Warning: A tie."]
-    assert json.loads(printed.out.splitlines()[-1]) == {"seconds": {"fit": 1.5}, "energy": None, "frames": 3}
+    assert json.loads(printed.out.splitlines()[-1]) == {
+        "warnings": ["A tie."],
+        "seconds": {"fit": 1.5},
+        "energy": None,
+        "frames": 3,
+    }
     assert "fit: keyframes" in printed.err
 
 

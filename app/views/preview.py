@@ -96,11 +96,11 @@ def preview_of(
     size = cloud_size(markers.positions)
     return ImportPreview(
         markers=markers,
-        subjects=subjects_of(raw.labels, raw.subjects),
-        subject=_owner(own),
+        subjects=subjects_of(raw.labels, raw.subjects, raw.assets),
+        subject=_owner(own, subjects_of(raw.labels, raw.subjects, raw.assets)),
         rate=markers.rate,
         rate_known=not problem,
-        units=_unit(settle_units(own.positions, own.units, units, str(path))[0]),
+        units=_unit(settle_units(own.positions, own.units, units, str(path), own.labels)[0]),
         units_declared=raw.units,
         up=_up_of(markers),
         up_declared=raw.up,
@@ -113,9 +113,9 @@ def preview_of(
     )
 
 
-def _owner(own: RawMarkers) -> str:
+def _owner(own: RawMarkers, subjects: tuple[str, ...]) -> str:
     """Whose markers these are, by what stands before their names."""
-    return next((name for label in own.labels if (name := prefix(label))), "")
+    return next((name for label in own.labels if (name := prefix(label)) in subjects), "")
 
 
 def _unit(metres: float) -> str:

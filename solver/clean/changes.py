@@ -69,10 +69,10 @@ def lines_of(changes: dict[str, Any]) -> tuple[str, ...]:
         for row in _by_marker(changes)
     ]
     return (
+        *changes["notes"],
         *(aligned([TITLES, *table]) if table else ()),
         *(f"{name} is never seen and stays lost." for name in changes["never_seen"]),
         *(f"Proposed edit {edit['number']}: {edit['sentence']}" for edit in changes["proposals"]),
-        *changes["notes"],
     )
 
 
@@ -91,6 +91,8 @@ def csv_of(changes: dict[str, Any]) -> str:
     for edit in changes["proposals"]:
         span = (edit["first_row"], edit["last_row"])
         writer.writerow(["edit proposed", *edit["markers"], *span, "", "", edit["kind"], "", "", edit["sentence"]])
+    for sentence in changes["notes"]:
+        writer.writerow(["note", *[""] * 9, sentence])
     return text.getvalue()
 
 

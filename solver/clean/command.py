@@ -16,6 +16,7 @@ from solver.clean.request import CleanRequest
 from solver.clean.swaps import apply_proposals
 from solver.errors import InputError
 from solver.io.atomic import write_text_atomic
+from solver.io.c3d_keep import Original
 from solver.io.filled_list import filled_list_path
 from solver.io.together import together
 from solver.markers import Markers
@@ -57,15 +58,16 @@ def clean_file(request: CleanRequest, progress: Progress = silent) -> Outcome:
         markers, made = _edited(markers, settings, request.apply)
     cleaned = clean(markers, settings, part_of(progress, 0.1, 0.9), fill_by)
     progress(0.9, "writing")
-    changes = changes_of(cleaned) | {"edits_made": made}
-    listed, table = request.out.with_suffix(".changes.json"), request.out.with_suffix(".changes.csv")
     old = (filled_list_path(request.out).name,) if request.out.suffix.lower() == ".trc" else ()
+    listed, table = request.out.with_suffix(".changes.json"), request.out.with_suffix(".changes.csv")
     with together(request.out.parent, gone=old) as folder:
-        write_markers(folder / request.out.name, cleaned.markers)
+        original = Original(request.markers, request.units, request.subject)
+        not_kept = write_markers(folder / request.out.name, cleaned.markers, original)
+        changes = changes_of(cleaned) | {"edits_made": made}
+        changes["notes"] = [*markers.notes, *not_kept, *changes["notes"]]
         write_text_atomic(folder / listed.name, json_text(about | changes) + "\n")
         write_text_atomic(folder / table.name, csv_of(changes))
     lines = (
-        *markers.notes,
         *(f"Edit made: {sentence}" for sentence in made),
         *lines_of(changes),
         f"Written to {request.out}; every change is in {listed.name} and {table.name} beside it.",
@@ -107,19 +109,20 @@ def settings_of(request: CleanRequest) -> CleanSettings:
     return replace(settings, fill=fill, outliers=outliers, fill_gaps=request.fill != "none")
 
 
-def write_markers(path: Path, markers: Markers) -> None:
-    """Write in the format that the name's ending says."""
-    from solver.io.export_c3d import write_c3d
+def write_markers(path: Path, markers: Markers, original: Original | None = None) -> tuple[str, ...]:
+    """Write in the format that the name's ending says; tell what of the original C3D, if any, was not kept in a C3D."""
+    from solver.io.c3d_keep import kept_or_plain
     from solver.io.export_csv import write_markers_csv
     from solver.io.export_trc import write_trc
 
     suffix = path.suffix.lower()
     if suffix == ".c3d":
-        write_c3d(path, markers)
-    elif suffix == ".trc":
+        return kept_or_plain(path, markers, original)
+    if suffix == ".trc":
         write_trc(path, markers)
     else:
         write_markers_csv(path, markers)
+    return ()
 
 
 def _edited(markers: Markers, settings: CleanSettings, numbers: tuple[int, ...]) -> tuple[Markers, list[str]]:

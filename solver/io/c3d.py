@@ -12,6 +12,7 @@ from solver.io.text import read_bytes
 from solver.markers import UpAxis
 
 _MODEL_OUTPUTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "MODELED_MARKERS")
+_OWN_GROUPS = ("POINT", "ANALOG", "TRIAL", "FORCE_PLATFORM", "EVENT", "MANUFACTURER", "?")
 _AXES: dict[str, UpAxis] = {"X": "x", "Y": "y", "Z": "z"}
 
 
@@ -24,19 +25,38 @@ def read_c3d(path: str | Path, data: bytes | None = None) -> RawMarkers:
     positions = np.where(content.lost[..., None], np.nan, content.xyz)
     # Many programs write residual 0 throughout: only beside measured points does it say "filled".
     filled = content.computed if (~content.computed & ~content.lost).any() else None
-    rate = content.numbers("POINT", "RATE")[:1]
     return RawMarkers(
         positions=positions,
         labels=labels,
-        rate=float(rate[0]) if rate.size and rate[0] > 0 else content.rate,
+        rate=content.rate,
         first_frame=content.first_frame - 1,
         units=next(iter(content.text("POINT", "UNITS")), None),
         up=_vertical(content),
         filled=filled,
         subjects=tuple(name for name in content.text("SUBJECTS", "NAMES") if name),
         virtual=_computed(content, labels),
-        notes=content.notes,
+        points=np.arange(count),
+        notes=content.notes + besides(content),
     )
+
+
+def besides(content: C3DContent) -> tuple[str, ...]:
+    """What a file holds besides its points: only a C3D written from it carries that on."""
+    section = content.section
+    events = section.count("EVENT", "USED") or 0
+    plates = section.count("FORCE_PLATFORM", "USED") or 0
+    others = [key for key in section.values if key[0] not in _OWN_GROUPS]
+    held = (
+        (section.count("ANALOG", "USED") or 0, "analog channel"),
+        (plates, "force plate"),
+        (events, "event"),
+        (len(others), "further parameter"),
+    )
+    said = [f"{number} {noun}{'' if number == 1 else 's'}" for number, noun in held if number]
+    if not said:
+        return ()
+    listed = said[0] if len(said) == 1 else f"{', '.join(said[:-1])} and {said[-1]}"
+    return (f"The C3D also holds {listed}: kept where a C3D is written from it, left out of every other format.",)
 
 
 def _computed(content: C3DContent, labels: tuple[str, ...]) -> np.ndarray:

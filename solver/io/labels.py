@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -19,6 +20,14 @@ _COMPUTED = re.compile(
     r"|\w+(Angles?|Force|Moment|Power|GRF)",
     re.ASCII,
 )
+
+_NOBODY = re.compile(
+    r"un[\s_-]?(label+ed|identified|named|assigned|known)([\s_]*(markers?|points?|trajector(y|ies)))?|none|ghosts?",
+    re.IGNORECASE,
+)
+_SIDE = re.compile(r"l|r|left|right|lt|rt", re.IGNORECASE)
+_NUMBERED = re.compile(r"((marker|point)[\s_]*)?\d+", re.IGNORECASE)
+_SEVERAL = 4
 
 
 def unique(names: Sequence[str], limit: int | None = None, clean: Callable[[str], str] = str.strip) -> tuple[str, ...]:
@@ -50,19 +59,49 @@ def _shorten(name: str, limit: int | None) -> str:
 
 
 def prefix(label: str) -> str:
-    """Subject that a label names before its colon, blank where it names none."""
+    """What a label says before its colon, blank where that is nothing, or that nobody knows whose marker it is."""
     head, colon, tail = label.partition(":")
-    return head.strip() if colon and tail.strip() and not label.startswith("*") else ""
+    head = head.strip()
+    return head if colon and tail.strip() and not label.startswith("*") and not _NOBODY.fullmatch(head) else ""
 
 
-def without_prefix(label: str) -> str:
-    """The label less its subject."""
-    return label.partition(":")[2].strip() if prefix(label) else label.strip()
+def without_prefix(label: str, subjects: Sequence[str] | None = None) -> str:
+    """The label less its subject; with ``subjects``, less one of these only."""
+    head = prefix(label)
+    return label.partition(":")[2].strip() if head and (subjects is None or head in subjects) else label.strip()
 
 
-def subjects_of(labels: Sequence[str], listed: Sequence[str]) -> tuple[str, ...]:
-    """Subjects that can be chosen: those the labels name, else the single one that the file lists."""
-    named = tuple(dict.fromkeys(p for p in map(prefix, labels) if p))
+def subjects_of(labels: Sequence[str], listed: Sequence[str], assets: Sequence[str] = ()) -> tuple[str, ...]:
+    """Subjects that can be chosen: those the labels name, else the single one that the file lists.
+
+    A colon is not a person yet: what stands before it counts as a subject where the file lists it as one, where it
+    has several markers, or where another one has markers of the same names. A rigid body's and a side's name, and
+    one whose markers have but numbers, count only where they are listed.
+
+    Parameters
+    ----------
+    assets : what the file says to be things, not people
+    """
+    names: dict[str, list[str]] = {}
+    for label in labels:
+        if head := prefix(label):
+            names.setdefault(head, []).append(label.partition(":")[2].strip())
+    shared = {
+        name for name, count in Counter(name for held in names.values() for name in set(held)).items() if count > 1
+    }
+    named = tuple(
+        head
+        for head, held in names.items()
+        if head not in assets
+        and (
+            head in listed
+            or (
+                not _SIDE.fullmatch(head)
+                and not all(map(_NUMBERED.fullmatch, held))
+                and (len(names) == 1 or len(held) >= _SEVERAL or bool(shared & set(held)))
+            )
+        )
+    )
     return named or (tuple(listed) if len(listed) == 1 else ())
 
 

@@ -20,6 +20,8 @@ from solver.io.units import settle_units
 from solver.io.up_axis import settle_up
 from solver.markers import Markers, UpAxis
 
+_LEAST_HZ, _MOST_HZ = 1.0, 2000.0
+_LONGEST_S = 4 * 3600.0
 _NO_VALUE = 9999999.0  # what some programs write where there is none
 
 
@@ -70,14 +72,15 @@ def settled(
         raise InputError(f"{up!r} is not a vertical axis", "up", "say x, y or z")
     if rate is not None and not (np.isfinite(rate) and rate > 0):
         raise InputError(f"{rate!r} is not a frame rate", "rate", "give it in Hz, for instance 100")
+    people = subjects_of(raw.labels, raw.subjects, raw.assets)
     raw = markers_of(raw, subject, path)
     positions = raw.positions
-    rate, rate_notes = _settle_rate(raw.rate, rate, path)
-    factor, unit_notes = settle_units(positions, raw.units, units, str(path))
+    rate, rate_notes = _settle_rate(raw.rate, rate, len(positions), path)
+    factor, unit_notes = settle_units(positions, raw.units, units, str(path), raw.labels)
     metres = positions * factor
     R_lab_internal, up_notes = settle_up(metres, raw, up)
     metres = _lost_as_nan(metres @ R_lab_internal)
-    labels = unique([without_prefix(label) for label in raw.labels])
+    labels = unique([without_prefix(label, people) for label in raw.labels])
     present = np.isfinite(metres).all(axis=2)
     unseen = [labels[m] for m in np.flatnonzero(~present.any(axis=0))]
     seen_notes = (f"Never seen: {_some(unseen)}.",) if unseen else ()
@@ -105,32 +108,40 @@ def markers_of(raw: RawMarkers, subject: str | None, path: str | Path) -> RawMar
 def list_subjects(path: str | Path) -> tuple[str, ...]:
     """Subjects in the file that ``load_markers`` can tell apart, in the file's order; empty where it names none."""
     raw = read_raw(path)
-    return subjects_of(raw.labels, raw.subjects)
+    return subjects_of(raw.labels, raw.subjects, raw.assets)
 
 
 @np.errstate(all="ignore")
 def read_raw(path: str | Path) -> RawMarkers:
     """What a file holds, as it stands there: before units, axes, rate and subject are settled."""
     data = read_bytes(path)
-    suffix = Path(path).suffix.lower()
-    if (suffix == ".c3d" and b"\0" in data[:512]) or looks_like_c3d(data):
+    if is_c3d(data, path):
         return read_c3d(path, data)
     text = decode(data, path)
-    if looks_like_trc(text) or suffix == ".trc":
+    if looks_like_trc(text) or Path(path).suffix.lower() == ".trc":
         return apply_filled_list(read_trc(path, text), path)
     return read_table(path, text)
 
 
+def is_c3d(data: bytes, path: str | Path) -> bool:
+    """Whether a file is a C3D, by what it holds; one that is damaged at its very start, by its name."""
+    return looks_like_c3d(data) or (Path(path).suffix.lower() == ".c3d" and b"\0" in data[:512])
+
+
 def _one_subject(raw: RawMarkers, wanted: str | None, path: str | Path) -> RawMarkers:
     """The markers of one subject, and those that belong to nobody."""
-    choices = subjects_of(raw.labels, raw.subjects)
+    choices = subjects_of(raw.labels, raw.subjects, raw.assets)
     if wanted is not None and wanted not in choices:
         remedy = f"choose one of: {', '.join(choices)}" if choices else "leave the subject out, the file names none"
         raise InputError(f"holds no subject {wanted!r}", path, remedy)
-    owners = np.array([prefix(label) for label in raw.labels], dtype=object)
+    owners = np.array([head if (head := prefix(label)) in choices else "" for label in raw.labels], dtype=object)
     if len(choices) < 2:
         if len(raw.subjects) > 1 and not choices:
             note = f"The file lists {_some(raw.subjects)} but not whose each marker is; all were taken."
+            return replace(raw, notes=(*raw.notes, note))
+        things = tuple(dict.fromkeys(head for label in raw.labels if (head := prefix(label)) and head not in choices))
+        if len(things) > 1 and not raw.assets:
+            note = f"What stands before the colons ({_some(things)}) was not taken for people; all markers were kept."
             return replace(raw, notes=(*raw.notes, note))
         return raw
     seen = (np.isfinite(raw.positions).all(axis=2) & (raw.positions != 0).any(axis=2)).sum(axis=0)
@@ -163,6 +174,7 @@ def _select(raw: RawMarkers, keep: np.ndarray) -> RawMarkers:
         labels=tuple(label for label, kept in zip(raw.labels, keep, strict=True) if kept),
         filled=None if raw.filled is None else raw.filled[:, keep],
         virtual=None if raw.virtual is None else raw.virtual[keep],
+        points=None if raw.points is None else raw.points[keep],
     )
 
 
@@ -172,13 +184,23 @@ def _lost_as_nan(positions: np.ndarray) -> np.ndarray:
     return np.where((odd | (positions == 0).all(axis=2))[..., None], np.nan, positions)
 
 
-def _settle_rate(found: float | None, wanted: float | None, path: str | Path) -> tuple[float, tuple[str, ...]]:
+def _settle_rate(
+    found: float | None, wanted: float | None, frames: int, path: str | Path
+) -> tuple[float, tuple[str, ...]]:
     found = found if found is not None and np.isfinite(found) and 0 < found < 1e6 else None
     if wanted is None and found is None:
         raise InputError("does not say its frame rate", path, "give the rate in Hz")
-    if wanted is None or found is None or wanted == found:
-        return wanted or found or 0.0, ()
-    return wanted, (f"The file says {found:g} Hz; {wanted:g} Hz was taken as asked.",)
+    if wanted is not None and found is not None and wanted != found:
+        rate, notes = wanted, [f"The file says {found:g} Hz; {wanted:g} Hz was taken as asked."]
+    else:
+        rate, notes = wanted or found or 0.0, []
+    if not _LEAST_HZ < rate <= _MOST_HZ:
+        notes.append(f"A rate of {rate:g} Hz is no motion capture's (1 to 2000 Hz); check it, or give the rate in Hz.")
+    if frames / rate > _LONGEST_S:
+        notes.append(
+            f"By its rate of {rate:g} Hz the recording lasts {frames / rate / 3600:.3g} hours; check the rate."
+        )
+    return rate, tuple(notes)
 
 
 def _some(names: list[str] | tuple[str, ...], most: int = 8) -> str:

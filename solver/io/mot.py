@@ -59,4 +59,16 @@ def read_mot(path: str | Path) -> Storage:
         raise InputError(f"is cut off or short of values in line {line}", path, "copy or export it again")
     table = number_table([row[: len(names)] for row in rows], [i for i, _ in body[1:]], path)
     degrees = {"yes": True, "no": False}.get(header.get("indegrees", ""))
-    return Storage(table[:, 0], {name: table[:, k] for k, name in enumerate(names) if k}, degrees)
+    return Storage(table[:, 0], {_plain(name, names): table[:, k] for k, name in enumerate(names) if k}, degrees)
+
+
+def _plain(name: str, names: list[str]) -> str:
+    """A coordinate's own name, where the file gives its path in the model (``/jointset/hip_r/hip_flexion_r/value``).
+
+    Speeds and other states keep their paths, as do names that would not differ any more.
+    """
+    parts = name.removesuffix("/value").split("/")
+    if not name.startswith("/") or "jointset" not in parts or (len(parts) > 4 and not name.endswith("/value")):
+        return name
+    same = [other for other in names if other.removesuffix("/value").split("/")[-1] == parts[-1]]
+    return parts[-1] if len(same) == 1 else name

@@ -114,8 +114,18 @@ def _rate(data: dict[str, Any], time: np.ndarray | None, where: str) -> float:
         if np.size(data.get(name, ())) == 1:
             rate = float(numbers(data[name], name, where).ravel()[0])
             if np.isfinite(rate) and rate > 0:
+                _refuse_contradiction(rate, time, where)
                 return rate
             raise InputError(f"a frame rate of {rate:g} Hz is not possible", where, "correct its mocap_frame_rate")
     if time is not None and len(time) > 1:
         return float(1 / np.median(np.diff(time)))
     raise InputError("it does not say its frame rate", where, "add 'mocap_frame_rate' in Hz")
+
+
+def _refuse_contradiction(rate: float, time: np.ndarray | None, where: str) -> None:
+    if time is None or len(time) < 3:
+        return
+    measured = (len(time) - 1) / float(time[-1] - time[0])
+    if abs(measured / rate - 1) > 0.02:
+        what = f"it says {rate:g} Hz but its times give {measured:.4g} Hz"
+        raise InputError(what, where, "correct its mocap_frame_rate or its time")

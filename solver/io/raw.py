@@ -25,7 +25,9 @@ class RawMarkers:
     usual_up : vertical axis that such files have by custom, a hint for guessing
     filled : (T, M) True where the file flags a position as filled or modelled
     subjects : names of subjects the file lists apart from the labels
+    assets : prefixes of labels that name a thing with markers on it, not a person
     virtual : (M,) True where the file itself lists a point as computed, not a marker
+    points : (M,) number of each marker among the file's points, None where that says nothing
     notes : what was assumed or left out so far, one sentence each
     """
 
@@ -39,5 +41,7 @@ class RawMarkers:
     usual_up: UpAxis | None = None
     filled: np.ndarray | None = None
     subjects: tuple[str, ...] = ()
+    assets: tuple[str, ...] = ()
     virtual: np.ndarray | None = None
+    points: np.ndarray | None = None
     notes: tuple[str, ...] = ()

@@ -20,6 +20,7 @@ from solver.io.text import (
     refuse_ragged_blanks,
     split_cells,
     split_lines,
+    thousands_mark,
 )
 from solver.io.timeline import even_grid
 
@@ -47,7 +48,7 @@ def read_trc(path: str | Path, text: str | None = None) -> RawMarkers:
             raise InputError(f"is cut off after frame {len(rows)} of {promised}", path, "copy or export it again")
         if len(split_cells(lines[-1])) < 2 + 3 * len(names):
             raise InputError(f"is cut off in line {len(lines)}", path, "copy or export it again")
-    table = number_table(rows, numbers, path)
+    table = number_table(rows, numbers, path, mark=thousands_mark(rows))
     names, values, notes = _columns(names, table)
     if promised and promised != len(rows):
         notes += (f"The header promises {promised} frames; the file holds {len(rows)}.",)

@@ -70,10 +70,10 @@ def solve_session(request: SolveRequest, progress: Progress = silent, on_event: 
         )
         progress(0.97, "writing results")
         require_state(folder, state, "nothing that was computed is lost; solve again with what it says now")
-        write_outputs(session, graph)
+        not_kept = write_outputs(session, graph)
         _save(session)
     progress(1.0, "done")
-    return _outcome(session, graph)
+    return _outcome(session, graph, not_kept)
 
 
 def session_of(request: SolveRequest) -> Session:
@@ -203,7 +203,7 @@ def _tidy(session: Session) -> Iterator[None]:
         raise
 
 
-def _outcome(session: Session, graph: GraphRun) -> SolveOutcome:
+def _outcome(session: Session, graph: GraphRun, not_kept: tuple[str, ...] = ()) -> SolveOutcome:
     motion, ranked, sync, surface = graph["fit"], graph["orient"], graph["sync"], graph["surface"]
     markers = graph["markers"]
     best = ranked.candidates[motion.chosen]
@@ -225,7 +225,7 @@ def _outcome(session: Session, graph: GraphRun) -> SolveOutcome:
         "m2s_mm": 1000 * surface.mean,
         "residual_median_mm": float(1000 * np.nanmedian(motion.residual)),
     }
-    said, doubted = assumptions(graph), doubts(graph)
+    said, doubted = (*assumptions(graph), *not_kept), doubts(graph)
     lines = (
         *(f"{name}: {event.text}." for name, event in graph.events.items() if event.text),
         *(f"Note: {note}" for note in said),

@@ -84,7 +84,9 @@ def test_every_change_is_a_line_of_a_table(trial: Path, tmp_path: Path) -> None:
     edit = next(row for row in rows if row["what"] == "edit proposed")
     assert (edit["method"], edit["marker"], edit["other"], edit["first_row"]) == ("swap", "E", "F", "151")
     assert edit["sentence"] == listed["proposals"][0]["sentence"]
-    assert len(rows) == sum(kinds.count(kind) for kind in ("cut", "filled", "left", "never seen", "edit proposed"))
+    assert len(rows) == sum(
+        kinds.count(kind) for kind in ("cut", "filled", "left", "never seen", "edit proposed", "note")
+    )
     clean_file(CleanRequest(trial, tmp_path / "clean.c3d", apply=(1,)))
     assert "edit made" in (tmp_path / "clean.changes.csv").read_text()
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import Any
 
 import numpy as np
 
 from solver.errors import InputError
+from solver.io.priors.fragments import Piece, joined, one_person
 from solver.io.priors.track import Track, numbers, rotations_from_matrices, rotations_from_vectors
 
 _Y_UP = np.diag([1.0, -1, -1])
@@ -28,22 +30,20 @@ def read_phalp(data: dict[Any, Any], where: str) -> Track:
             found.setdefault(person, {}).setdefault(frame, body)
     if not found:
         raise InputError("no person was tracked in any of its frames", where, "use a video that shows the whole person")
-    person = max(found, key=lambda p: len(found[p]))
-    frames = sorted(found[person])
-    matrices = np.stack([_phalp_pose(found[person][f], where) for f in frames])
-    notes: tuple[str, ...] = ()
-    if len(found) > 1:
-        notes = (
-            f"{len(found)} people were tracked; the one tracked longest is used (id {person}, {len(frames)} frames).",
-        )
+    pieces: dict[int, Piece] = {}
+    for person, bodies in found.items():
+        frames = sorted(bodies)
+        matrices = np.stack([_phalp_pose(bodies[f], where) for f in frames])
+        pieces[person] = Piece(np.array(frames), rotations_from_matrices(matrices, "smpl", where))
+    chain, notes = one_person(pieces)
+    piece = joined(pieces, chain)
     last = max(max(per_frame) for per_frame in found.values())
-    rotations = rotations_from_matrices(matrices, "smpl", where)
-    shapes = [found[person][f].get("betas") for f in frames]
+    shapes = [found[person][int(f)].get("betas") for person in chain for f in pieces[person].frames]
     sizes = {np.size(shape) for shape in shapes if isinstance(shape, np.ndarray)}
     alike = len(sizes) == 1 and all(isinstance(shape, np.ndarray) for shape in shapes)
     betas = np.stack([np.ravel(shape) for shape in shapes]) if alike else None
-    seen = np.ones(len(frames), bool)
-    track = Track(rotations, np.array(frames), seen, notes=notes, betas=betas, kind="smpl")
+    seen = np.ones(len(piece.frames), bool)
+    track = Track(piece.rotations, piece.frames, seen, notes=notes, betas=betas, kind="smpl")
     return _extended(track, max(last, len(data) - 1))
 
 
@@ -91,19 +91,23 @@ def _extended(track: Track, last: int) -> Track:
 
 def read_wham(data: dict[Any, Any], where: str) -> Track:
     """WHAM: per subject ``pose`` (T, 72) in the camera's axes, and ``frame_ids`` where it was seen."""
-    person = max(data, key=lambda p: len(np.atleast_1d(data[p]["pose"])))
-    subject = data[person]
-    pose = numbers(subject["pose"], "pose", where)
-    rotations = rotations_from_vectors(np.atleast_2d(pose), "pose", where)
-    ids = subject.get("frame_ids", subject.get("frame_id"))
-    frames = _frames(ids, "frame_ids", len(rotations), where)
-    notes = (
-        (f"{len(data)} people were tracked; the one tracked longest is used (subject {person}).",)
-        if len(data) > 1
-        else ()
-    )
-    seen = np.ones(len(frames), bool)
-    return Track(rotations, frames, seen, notes=notes, betas=subject.get("betas"), kind="smpl")
+    pieces: dict[Hashable, Piece] = {}
+    for person, subject in data.items():
+        rotations = rotations_from_vectors(np.atleast_2d(numbers(subject["pose"], "pose", where)), "pose", where)
+        ids = subject.get("frame_ids", subject.get("frame_id"))
+        frames = _frames(ids, "frame_ids", len(rotations), where)
+        if (np.diff(frames) <= 0).any():
+            raise InputError("its frame numbers are not ascending counts", where, _AGAIN)
+        if len(frames):
+            pieces[person] = Piece(frames, rotations)
+    if not pieces:
+        raise InputError("it has no frames", where, _AGAIN)
+    chain, notes = one_person(pieces)
+    piece = joined(pieces, chain)
+    longest = max(chain, key=lambda person: len(pieces[person].frames))
+    seen = np.ones(len(piece.frames), bool)
+    betas = data[longest].get("betas")
+    return Track(piece.rotations, piece.frames, seen, notes=notes, betas=betas, kind="smpl")
 
 
 def read_tram(data: dict[Any, Any], where: str) -> Track:

@@ -10,6 +10,7 @@ import numpy as np
 
 from solver.body.skeleton import JOINTS
 from solver.errors import InputError
+from solver.io.timeline import in_seconds
 from solver.prior import PosePrior
 from solver.prior_fill import fill_lost
 from solver.rotations import exp_so3
@@ -140,7 +141,7 @@ def complete(track: Track, fps: float | None, where: str) -> PosePrior:
     rotations[track.frames], tracked[track.frames] = track.rotations, track.tracked
     time = np.arange(last + 1) / rate
     if track.time is not None:
-        time, rate_note = _clock(track.time, last + 1, where), ()
+        time, rate_note = _clock(track.time, last + 1, track.rate, where)
     lost = int((~tracked).sum())
     lost_note = (f"{lost} of {last + 1} frames were lost by the video and are filled in.",) if lost else ()
     betas, shape_note = shape_of(track)
@@ -155,10 +156,17 @@ def complete(track: Track, fps: float | None, where: str) -> PosePrior:
     )
 
 
-def _clock(time: np.ndarray, count: int, where: str) -> np.ndarray:
+def _clock(time: np.ndarray, count: int, rate: float | None, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
+    """The file's own times in s, held against its rate, and what they disagree on."""
     if time.shape != (count,) or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
         raise InputError("its field 'time' is not one ascending number per frame", where, "remove it or correct it")
-    return time
+    if count < 3:
+        return time, ()
+    time, notes = in_seconds(time, rate)
+    measured = float((count - 1) / (time[-1] - time[0]))
+    if rate is not None and abs(measured / rate - 1) > 0.02:
+        notes += (f"The file says {rate:g} Hz but its times {measured:.4g} Hz; its times were used.",)
+    return time, notes
 
 
 def _rate(own: float | None, given: float | None, where: str) -> tuple[float, tuple[str, ...]]:
