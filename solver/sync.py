@@ -118,6 +118,16 @@ def find_offset(landmarks: Landmarks, markers: Markers, *, search: tuple[float, 
     return Sync(offset, ratio, confidence, lags, score, margin, notes=tuple(notes))
 
 
+def evidence_near(landmarks: Landmarks, markers: Markers, offset: float, rate_ratio: float = 1.0) -> float:
+    """Nats by which these markers move as the landmarks do, near an offset (s), beyond what chance reaches."""
+    video, moved = _of_video(landmarks), _of_markers(markers)
+    lags = offset + np.arange(-1.0, 1.0 + 0.5 * _COARSE, _COARSE)
+    score = _evidence(video, moved, lags, rate_ratio)
+    if not np.isfinite(score).any():
+        return 0.0
+    return float(np.nanmax(score)) - max(_chance(video, moved, lags), 0.0)
+
+
 def _likely(video: np.ndarray, markers: np.ndarray) -> tuple[float, float]:
     """Offsets, s, at which the shorter recording lies within the longer, and somewhat beyond."""
     ends = (markers[0] - video[0], markers[-1] - video[-1])

@@ -13,6 +13,7 @@ from solver.pipeline.inputs import LandmarkSettings, MarkerSettings, PriorSettin
 from solver.pipeline.stage import NoSettings, Stage
 from solver.prior import PosePrior
 from solver.segment import Segmentation, SegmentSettings
+from solver.solve.doubts.rules import Verdict
 from solver.solve.results import FittedMotion, Localization, Orientation
 from solver.solve.settings import FitSettings, LocalizeSettings, OrientSettings
 from solver.surface import SurfaceDistance
@@ -68,6 +69,11 @@ def _said_surface(found: SurfaceDistance) -> str:
     return f"markers {1000 * found.mean:.1f} mm from the skin (m2s)"
 
 
+def _said_check(found: Verdict) -> str:
+    kinds = ", ".join(doubt.kind for doubt in found.doubts)
+    return f"confidence {found.confidence:.2f}; {f'in doubt: {kinds}' if kinds else 'no rule speaks against it'}"
+
+
 def _said_angles(angles: JointAngles) -> str:
     return f"{len(angles.names)} angles ({angles.title})"
 
@@ -95,7 +101,7 @@ GRAPH = (
     Stage("segment", 1, SegmentSettings, ("clean",), fitting.group_markers, Segmentation, said_segmentation, cost=0.3),
     Stage(
         "localize",
-        3,
+        4,
         LocalizeSettings,
         (*FITTED_TO, "segment", "camera_file"),
         fitting.place_markers,
@@ -105,7 +111,7 @@ GRAPH = (
     ),
     Stage(
         "orient",
-        6,
+        7,
         OrientSettings,
         (*FITTED_TO, "localize", "camera_file"),
         fitting.rank_placements,
@@ -115,7 +121,7 @@ GRAPH = (
     ),
     Stage(
         "fit",
-        3,
+        4,
         FitSettings,
         (*FITTED_TO, "localize", "orient"),
         fitting.fit_every_frame,
@@ -133,6 +139,16 @@ GRAPH = (
         SurfaceDistance,
         _said_surface,
         cost=2,
+    ),
+    Stage(
+        "check",
+        1,
+        NoSettings,
+        ("clean", "prior", "sync", "segment", "localize", "orient", "fit", "surface"),
+        fitting.check_result,
+        Verdict,
+        _said_check,
+        cost=0.1,
     ),
 )
 """Every stage of the default method."""

@@ -18,6 +18,7 @@ from solver.localize import Hypothesis
 from solver.parallel import spread
 from solver.progress import Found, Progress, silent, tell
 from solver.rotations import log_so3
+from solver.solve.confidence import alike
 from solver.solve.kinematics import Points, Pose, blended_turn, forward, place_points
 from solver.solve.placement import Skin
 from solver.solve.problem import Problem
@@ -79,6 +80,9 @@ SEARCH = (
     Round(_PLACED, 1.2, 16),
 )
 """On few keyframes: poor starts are dropped early, more of them the clearer it is which are poor."""
+_TRIED = 3
+_CATCH_UP = (SEARCH[2].phase, _PLACED, _PLACED)
+"""Answers left behind that are followed to see how far behind the best different one is, and how."""
 FINE = (
     Phase(0.015, 0.06, 4, reassign=True, free_placement=True),
     Phase(0.01, 0.04, 6, free_placement=True),
@@ -99,6 +103,7 @@ class Fit:
     trace : total energy after every step
     poses : after every step, of the keyframes that it was solved on then
     refined : True once it was solved on all keyframes
+    behind : times the best answer's energy, on few keyframes, once it was left behind; NaN where that is not known
     """
 
     start: Hypothesis
@@ -108,6 +113,7 @@ class Fit:
     trace: tuple[float, ...]
     poses: tuple[Pose, ...] = ()
     refined: bool = False
+    behind: float = float("nan")
 
 
 def start_state(
@@ -312,7 +318,35 @@ def relax(
     fine = spread(partial(_advance, whole, phases=FINE[1:], base=base, judge=judge), fine)
     fine.sort(key=lambda fit: fit.energies.total)
     say(fine)
+    if all(same_stand(fine[0], fit) for fit in fine):
+        coarse = next(fit for fit in chosen if fit.start is fine[0].start)
+        left = _with_rival(problem, coarse, fine[0], left, base)
     return tuple(fine) + tuple(left[:_SHOWN])
+
+
+def same_stand(one: Fit, other: Fit) -> bool:
+    """Whether two fits are the same answer."""
+    bones, others = (fit.state.placement.weights.argmax(1) for fit in (one, other))
+    return alike(bones, others, one.state.camera.R_lab_cam, other.state.camera.R_lab_cam)
+
+
+def _with_rival(problem: Problem, coarse: Fit, best: Fit, left: list[Fit], base: Weights) -> list[Fit]:
+    """Those that were left behind, the best different answer among them first, with what it costs beside the best.
+
+    They were left early, when energies said little. So the rival descends as far as the best had on few keyframes.
+
+    Parameters
+    ----------
+    coarse : the best answer as it was then
+    """
+    judge = phase_weights(base, _PLACED)
+    tried = [fit for fit in left if not same_stand(best, fit)][:_TRIED]
+    for fit in tried:
+        rival = _advance(problem, fit, phases=_CATCH_UP, base=base, judge=judge)
+        if not same_stand(best, rival):
+            rival = replace(rival, behind=rival.energies.total / max(coarse.energies.total, 1e-9), poses=fit.poses)
+            return [rival, *(other for other in left if other is not fit)]
+    return left
 
 
 def _tell(progress: Progress, guesses: Sequence[Hypothesis], fits: Sequence[Fit]) -> None:

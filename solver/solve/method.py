@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, replace
+from functools import partial
 
 import numpy as np
 
@@ -13,6 +15,10 @@ from solver.localize import Hypothesis, Search, hypotheses
 from solver.progress import Progress, silent
 from solver.rotations import log_so3
 from solver.solve.bundle import FINE, Fit, descend, relax
+from solver.solve.doubts.clouds import clouds, taken_cloud
+from solver.solve.doubts.far import FAR_M, suspects, typical
+from solver.solve.doubts.mirror import in_mirror, video_in_doubt
+from solver.solve.doubts.still import still_markers
 from solver.solve.ending import motion_from
 from solver.solve.kinematics import Points, Pose, forward, place_points
 from solver.solve.placement import Skin
@@ -25,10 +31,20 @@ from solver.solve.trust import believed, trusted
 
 _REACH_M = 2.0
 """No marker on a person is usually further from the middle of all markers."""
+_SIFTINGS = 2
+"""Times that markers which fit no place are left out; the first time, those of others still pull at the body."""
+_FEWEST = 3
+_CLEAR, _LOOSE_SHARE = 1.3, 0.1
+"""An answer that is less clear than this, or leaves more of the markers off their places, may have a wrong video."""
 
 
 def localize(
-    body: Body, seen: Observations, left_out: np.ndarray, settings: LocalizeSettings, camera: CameraResult | None = None
+    body: Body,
+    seen: Observations,
+    left_out: np.ndarray,
+    settings: LocalizeSettings,
+    camera: CameraResult | None = None,
+    match: Callable[[np.ndarray], float] | None = None,
 ) -> Localization:
     """Hypotheses of where the markers sit.
 
@@ -38,10 +54,17 @@ def localize(
     seen : all T frames
     left_out : (M,) True for markers that the user left out
     camera : from another trial of the same session
+    match : nats by which the markers of some columns move as the video does, to choose among several people's
     """
     present = np.isfinite(seen.markers).all(axis=2)
     often = (present.mean(axis=0) >= settings.seen_share) & (present.sum(axis=0) >= 3)
-    used = within_reach(seen.markers, np.flatnonzero(often & ~left_out))
+    wanted = np.flatnonzero(often & ~left_out)
+    standing = wanted[still_markers(seen.markers[:, wanted])] if settings.leave_out_still else wanted[:0]
+    wanted = np.setdiff1d(wanted, standing)
+    cloud = np.full(seen.markers.shape[1], -1)
+    cloud[wanted] = clouds(seen.markers[:, wanted])
+    taken = taken_cloud(cloud, settings.part_of_cloud, match)
+    used = within_reach(seen.markers, wanted[(cloud[wanted] == taken) | (cloud[wanted] < 0)])
     if len(used) < 3:
         raise InputError(
             f"only {len(used)} markers are seen in enough frames", "the markers", "record or keep at least 3 markers"
@@ -70,6 +93,9 @@ def localize(
         cost_mm=np.sqrt([h.cost for h in found]) * 1000,
         start=tuple(h.start for h in found),
         yaw_deg=np.array([h.yaw_deg for h in found]),
+        still=standing,
+        cloud=cloud,
+        taken=taken,
     )
 
 
@@ -110,8 +136,15 @@ def orient(
     settings: OrientSettings,
     camera: CameraResult | None = None,
     progress: Progress = silent,
+    *,
+    try_mirror: bool = True,
 ) -> Orientation:
-    """Every hypothesis relaxed, the best refined, all ranked."""
+    """Every hypothesis relaxed, the best refined, all ranked; markers that fit no place left out.
+
+    Parameters
+    ----------
+    try_mirror : where the answer contradicts the video, see what its mirror image costs
+    """
     from solver.solve.confidence import judge
 
     used = replace(seen, markers=seen.markers[:, found.markers])
@@ -126,24 +159,72 @@ def orient(
     if camera is not None:
         known = _camera_of(camera, used.lab_centre)
         weights = replace(weights, free_camera=False)
-    fits = relax(
+    search = partial(
+        relax,
         body,
-        used,
-        landmarks,
-        guesses,
-        found.few,
-        found.many,
-        weights,
+        landmarks=landmarks,
+        guesses=guesses,
+        few=found.few,
+        many=found.many,
+        base=weights,
         keep=settings.refine,
         camera=known,
         progress=progress,
     )
+    fits = search(used)
+    far = np.zeros(len(found.markers), dtype=bool)
+    if settings.leave_out_far:
+        for _ in range(_SIFTINGS):
+            more = _far(body, used.at(found.many), fits[0]) & ~far
+            if not more.any() or (far | more).sum() > len(far) - _FEWEST:
+                break
+            far |= more
+            used = replace(used, markers=np.where(far[:, None], np.nan, used.markers))
+            fits = search(used)
     index = {id(guess): i for i, guess in enumerate(guesses)}
     whole = Problem(body, used.at(found.many), landmarks)
     candidates = tuple(
         _candidate(body, fit, index[id(fit.start)], whole, _steps(fit.poses, found.few, found.many)) for fit in fits
     )
-    return judge(candidates)
+    ranked = replace(judge(candidates, ~far), far=found.markers[far])
+    best = candidates[0]
+    if try_mirror and camera is None and best.refined:
+        joint = np.where(far, -1, best.bone)
+        doubtful = ranked.margin < _CLEAR or far.any() or _loose(body, used.at(found.many), fits[0]) > _LOOSE_SHARE
+        if doubtful or video_in_doubt(best.rotations, used.at(found.many), joint, best.camera.reprojection_px):
+            ranked = replace(ranked, mirror=best.energy / _mirrored_energy(body, used, landmarks, found, settings))
+    return ranked
+
+
+def _far(body: Body, seen: Observations, fitted: Fit) -> np.ndarray:
+    """(U,) True for markers that the best answer puts far from where they are seen; none where it was not refined."""
+    if not fitted.refined:
+        return np.zeros(seen.markers.shape[1], dtype=bool)
+    return typical(_residual(body, seen, fitted)) > FAR_M
+
+
+def _loose(body: Body, seen: Observations, fitted: Fit) -> float:
+    """Share of the markers that an answer leaves far enough from their places to be on a wrong bone."""
+    return len(suspects(_residual(body, seen, fitted))) / max(seen.markers.shape[1], 1)
+
+
+def _residual(body: Body, seen: Observations, fitted: Fit) -> np.ndarray:
+    """(N, U) m, distance of each marker from where an answer puts it; NaN where lost."""
+    state = fitted.state
+    placed = place_points(state.placement, forward(body, state.pose), state.pose.betas)
+    return np.linalg.norm(seen.markers - placed, axis=2)
+
+
+def _mirrored_energy(
+    body: Body, used: Observations, landmarks: Points, found: Localization, settings: OrientSettings
+) -> float:
+    """What the best answer costs with the video's mirror image."""
+    seen = in_mirror(used)
+    few, many = len(found.few), len(found.many)
+    own = LocalizeSettings(few=few, many=many, leave_out_still=False, part_of_cloud=1)
+    again = localize(body, seen, ~np.isfinite(seen.markers).all(axis=2).any(axis=0), own)
+    ranked = orient(body, seen, landmarks, again, replace(settings, leave_out_far=False), try_mirror=False)
+    return ranked.candidates[0].energy
 
 
 def fit(
@@ -159,11 +240,17 @@ def fit(
     """The chosen answer carried to every frame."""
     row = chosen_row(ranked, settings)
     chosen = ranked.candidates[row]
-    used = replace(seen, markers=seen.markers[:, found.markers])
+    used = in_use(seen, found, ranked)
     frames = found.many if chosen.refined else found.few
     state, surface, weights = _settled(body, used.at(frames), landmarks, chosen, settings)
     pose = every_frame(body, used, landmarks, frames, state, surface, weights, progress)
     return fitted_motion(body, seen, found, ranked, settings, state, pose, time)
+
+
+def in_use(seen: Observations, found: Localization, ranked: Orientation) -> Observations:
+    """What is seen of the markers in use (U); those that belong to nobody count as lost."""
+    nobody = np.isin(found.markers, ranked.far)
+    return replace(seen, markers=np.where(nobody[:, None], np.nan, seen.markers[:, found.markers]))
 
 
 def chosen_row(ranked: Orientation, settings: FitSettings) -> int:
@@ -200,14 +287,16 @@ def fitted_motion(
     row = chosen_row(ranked, settings)
     camera = ranked.candidates[row].camera
     pinned = settings.candidate is not None
+    kept = ~np.isin(found.markers, ranked.far)
+    bone, vertex = _sites(body, state)
     return motion_from(
         body,
         seen.markers,
         time,
         pose,
-        found.markers,
-        state.placement,
-        _sites(body, state),
+        found.markers[kept],
+        state.placement.take(np.flatnonzero(kept)),
+        (bone[kept], vertex[kept]),
         camera=_written(state.camera, camera.image_size, camera.reprojection_px),
         chosen=row,
         confidence=1.0 if pinned else ranked.confidence,
@@ -301,6 +390,7 @@ def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem, steps: 
         trace=fitted.trace,
         bias=state.bias,
         steps=steps,
+        behind=fitted.behind,
     )
 
 
