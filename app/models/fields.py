@@ -29,6 +29,7 @@ TITLES = {
     "fit": "Fit",
     "angles": "Joint angles",
     "surface": "Distance to the skin",
+    "check": "Doubts",
 }
 _UNITS = {"m": "m", "mm": "mm", "s": "s", "Hz": "Hz", "px": "px", "degrees": "deg", "degree": "deg"}
 _SUFFIXES = {"_mm": "mm", "_deg": "deg", "_s": "s", "_px": "px", "_hz": "Hz"}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,16 +54,7 @@ def place_markers(given: Mapping[str, Any], settings: LocalizeSettings, progress
     body, seen, _ = scene(given)
     left_out = given["segment"].clusters < 0
     camera = _camera(given["camera_file"], seen.image_size)
-    return localize(body, seen, left_out, settings, camera, partial(_moves_as_video, given))
-
-
-def _moves_as_video(given: Mapping[str, Any], columns: np.ndarray) -> float:
-    """Nats by which some of the markers move as the video does, near the offset that was found."""
-    from solver.pipeline.inputs import watched
-    from solver.sync import evidence_near
-
-    sync, markers = given["sync"], measured(given["clean"]).select(markers=columns)
-    return evidence_near(watched(given), markers, sync.offset, sync.rate_ratio)
+    return localize(body, seen, left_out, settings, camera)
 
 
 def rank_placements(given: Mapping[str, Any], settings: OrientSettings, progress: Progress) -> Orientation:
@@ -115,6 +105,7 @@ def check_result(given: Mapping[str, Any], settings: NoSettings, progress: Progr
     from solver.solve.doubts.doubt import Evidence
     from solver.solve.doubts.rules import verdict
     from solver.solve.observe import on_clock
+    from solver.sync import lead
 
     motion, surface, sync, found = given["fit"], given["surface"], given["sync"], given["localize"]
     ranked: Orientation = given["orient"]
@@ -133,6 +124,7 @@ def check_result(given: Mapping[str, Any], settings: NoSettings, progress: Progr
         reprojection=motion.camera.reprojection_px,
         image_size=motion.camera.image_size,
         sync_confidence=sync.confidence,
+        sync_lead=lead(sync),
         still=getattr(found, "still", nothing),  # the published method leaves nothing out
         cloud=getattr(found, "cloud", nothing),
         taken=getattr(found, "taken", 0),

@@ -193,28 +193,22 @@ def _given_offset(settings: SyncSettings) -> Sync | None:
     return Sync(settings.offset, settings.rate_ratio or 1.0, 1.0, lags, score, method="given")
 
 
-def watched(given: Mapping[str, Any]) -> Landmarks:
-    """The video's landmarks, or what stands for them where there is only a prior."""
-    if given["landmarks"] is not None:
-        landmarks: Landmarks = given["landmarks"]
-        return landmarks
-    from solver.body.model import Body
-    from solver.video.shadow import landmarks_of_prior
-
-    return landmarks_of_prior(given["prior"], Body.load())
-
-
 def _found_offset(given: Mapping[str, Any], settings: SyncSettings) -> Sync:
     from solver.sync import find_offset
 
-    seen = watched(given)
+    watched = given["landmarks"]
+    if watched is None:
+        from solver.body.model import Body
+        from solver.video.shadow import landmarks_of_prior
+
+        watched = landmarks_of_prior(given["prior"], Body.load())
     window = None if settings.search_s is None else (-settings.search_s, settings.search_s)
     if settings.rate_ratio is None:
-        return find_offset(seen, measured(given["clean"]), search=window)
-    seen = replace(seen, time=seen.time * settings.rate_ratio)
-    found = find_offset(seen, measured(given["clean"]), search=window)
+        return find_offset(watched, measured(given["clean"]), search=window)
+    watched = replace(watched, time=watched.time * settings.rate_ratio)
+    found = find_offset(watched, measured(given["clean"]), search=window)
     # A ratio that was given stays: where another fits better, the two agree in the middle of the video.
-    middle = 0.5 * (seen.time[0] + seen.time[-1])
+    middle = 0.5 * (watched.time[0] + watched.time[-1])
     return replace(found, rate_ratio=settings.rate_ratio, offset=found.offset + (found.rate_ratio - 1) * middle)
 
 

@@ -56,7 +56,7 @@ def said_orientation(ranked: Orientation) -> str:
     margin = (
         "no other answer" if ranked.runner_up < 0 else f"next different answer costs {ranked.margin:.2f} times as much"
     )
-    return f"{best.part}; {margin}; confidence {ranked.confidence:.2f}"
+    return f"{best.part}; {margin}"
 
 
 def said_fit(motion: FittedMotion) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, replace
 from functools import partial
 
@@ -14,10 +13,9 @@ from solver.errors import InputError
 from solver.localize import Hypothesis, Search, hypotheses
 from solver.progress import Progress, silent
 from solver.rotations import log_so3
-from solver.solve.bundle import FINE, Fit, descend, relax
+from solver.solve.bundle import FINE, Fit, descend, relax, settled_again
 from solver.solve.doubts.clouds import clouds, taken_cloud
-from solver.solve.doubts.far import FAR_M, suspects, typical
-from solver.solve.doubts.mirror import in_mirror, video_in_doubt
+from solver.solve.doubts.mirror import both_sides, in_mirror, video_in_doubt
 from solver.solve.doubts.still import still_markers
 from solver.solve.ending import motion_from
 from solver.solve.kinematics import Points, Pose, forward, place_points
@@ -26,6 +24,7 @@ from solver.solve.problem import Problem
 from solver.solve.refine import every_frame
 from solver.solve.results import CameraResult, Candidate, FittedMotion, Localization, Orientation, Steps
 from solver.solve.settings import FitSettings, LocalizeSettings, OrientSettings
+from solver.solve.sifting import loose_share, strays, without_place
 from solver.solve.state import Camera, Observations, State, Surface, Weights
 from solver.solve.trust import believed, trusted
 
@@ -34,7 +33,7 @@ _REACH_M = 2.0
 _SIFTINGS = 2
 """Times that markers which fit no place are left out; the first time, those of others still pull at the body."""
 _FEWEST = 3
-_CLEAR, _LOOSE_SHARE = 1.3, 0.1
+_CLEAR, _LOOSE_SHARE = 1.15, 0.1
 """An answer that is less clear than this, or leaves more of the markers off their places, may have a wrong video."""
 
 
@@ -44,7 +43,6 @@ def localize(
     left_out: np.ndarray,
     settings: LocalizeSettings,
     camera: CameraResult | None = None,
-    match: Callable[[np.ndarray], float] | None = None,
 ) -> Localization:
     """Hypotheses of where the markers sit.
 
@@ -54,7 +52,6 @@ def localize(
     seen : all T frames
     left_out : (M,) True for markers that the user left out
     camera : from another trial of the same session
-    match : nats by which the markers of some columns move as the video does, to choose among several people's
     """
     present = np.isfinite(seen.markers).all(axis=2)
     often = (present.mean(axis=0) >= settings.seen_share) & (present.sum(axis=0) >= 3)
@@ -63,24 +60,15 @@ def localize(
     wanted = np.setdiff1d(wanted, standing)
     cloud = np.full(seen.markers.shape[1], -1)
     cloud[wanted] = clouds(seen.markers[:, wanted])
-    taken = taken_cloud(cloud, settings.part_of_cloud, match)
+    overlay = partial(_laid_over, body, seen, settings=settings, camera=camera)
+    taken = taken_cloud(cloud, settings.part_of_cloud, lambda own: overlay(own)[0][0].cost)
     used = within_reach(seen.markers, wanted[(cloud[wanted] == taken) | (cloud[wanted] < 0)])
     if len(used) < 3:
         raise InputError(
             f"only {len(used)} markers are seen in enough frames", "the markers", "record or keep at least 3 markers"
         )
-    few = keyframes(seen, used, settings.few)
+    found, few = overlay(used)
     many = np.union1d(few, keyframes(seen, used, settings.many))
-    betas = np.zeros(body.shape_count)
-    vertices = np.intersect1d(body.lod_index, np.flatnonzero(body.marker_mask))[::3]
-    placement, _ = Skin(body, betas).on_vertices(vertices, Weights().offset)
-    still = Pose(seen.prior[few], np.repeat(-body.joint_template[:1], len(few), axis=0), betas)
-    points = place_points(placement, forward(body, still), betas)
-    bone = body.weights[vertices].argmax(axis=1)
-    search = Search(yaws=settings.yaws, keep=settings.keep, any_orientation=settings.any_orientation)
-    found = hypotheses(
-        seen.markers[few][:, used], points, vertices, bone, search, None if camera is None else camera.R_lab_cam
-    )
     vertex = np.stack([h.vertex for h in found])
     return Localization(
         markers=used,
@@ -97,6 +85,22 @@ def localize(
         cloud=cloud,
         taken=taken,
     )
+
+
+def _laid_over(
+    body: Body, seen: Observations, used: np.ndarray, settings: LocalizeSettings, camera: CameraResult | None
+) -> tuple[tuple[Hypothesis, ...], np.ndarray]:
+    """The ways to lay the video's body over some columns of the markers, the nearest first, and the few keyframes."""
+    few = keyframes(seen, used, settings.few)
+    betas = np.zeros(body.shape_count)
+    vertices = np.intersect1d(body.lod_index, np.flatnonzero(body.marker_mask))[::3]
+    placement, _ = Skin(body, betas).on_vertices(vertices, Weights().offset)
+    still = Pose(seen.prior[few], np.repeat(-body.joint_template[:1], len(few), axis=0), betas)
+    points = place_points(placement, forward(body, still), betas)
+    bone = body.weights[vertices].argmax(axis=1)
+    search = Search(yaws=settings.yaws, keep=settings.keep, any_orientation=settings.any_orientation)
+    turn = None if camera is None else camera.R_lab_cam
+    return hypotheses(seen.markers[few][:, used], points, vertices, bone, search, turn), few
 
 
 def within_reach(markers: np.ndarray, used: np.ndarray) -> np.ndarray:
@@ -173,14 +177,18 @@ def orient(
     )
     fits = search(used)
     far = np.zeros(len(found.markers), dtype=bool)
-    if settings.leave_out_far:
-        for _ in range(_SIFTINGS):
-            more = _far(body, used.at(found.many), fits[0]) & ~far
-            if not more.any() or (far | more).sum() > len(far) - _FEWEST:
-                break
-            far |= more
-            used = replace(used, markers=np.where(far[:, None], np.nan, used.markers))
-            fits = search(used)
+    for _ in range(_SIFTINGS if settings.leave_out_far else 0):
+        whole = Problem(body, used.at(found.many), landmarks)
+        stray = strays(body, fits[0], used.at(found.many).markers)
+        if not stray.any():
+            break
+        nowhere = stray & without_place(whole, fits[0], weights.offset)
+        if not nowhere.any() or (far | nowhere).sum() > len(far) - _FEWEST:
+            fits = (settled_again(whole, fits[0], weights), *fits[1:])
+            break
+        far |= nowhere
+        used = replace(used, markers=np.where(far[:, None], np.nan, used.markers))
+        fits = search(used)
     index = {id(guess): i for i, guess in enumerate(guesses)}
     whole = Problem(body, used.at(found.many), landmarks)
     candidates = tuple(
@@ -190,29 +198,11 @@ def orient(
     best = candidates[0]
     if try_mirror and camera is None and best.refined:
         joint = np.where(far, -1, best.bone)
-        doubtful = ranked.margin < _CLEAR or far.any() or _loose(body, used.at(found.many), fits[0]) > _LOOSE_SHARE
+        loose = loose_share(body, fits[0], used.at(found.many).markers) > _LOOSE_SHARE
+        doubtful = both_sides(joint) and (ranked.margin < _CLEAR or far.any() or loose)
         if doubtful or video_in_doubt(best.rotations, used.at(found.many), joint, best.camera.reprojection_px):
             ranked = replace(ranked, mirror=best.energy / _mirrored_energy(body, used, landmarks, found, settings))
     return ranked
-
-
-def _far(body: Body, seen: Observations, fitted: Fit) -> np.ndarray:
-    """(U,) True for markers that the best answer puts far from where they are seen; none where it was not refined."""
-    if not fitted.refined:
-        return np.zeros(seen.markers.shape[1], dtype=bool)
-    return typical(_residual(body, seen, fitted)) > FAR_M
-
-
-def _loose(body: Body, seen: Observations, fitted: Fit) -> float:
-    """Share of the markers that an answer leaves far enough from their places to be on a wrong bone."""
-    return len(suspects(_residual(body, seen, fitted))) / max(seen.markers.shape[1], 1)
-
-
-def _residual(body: Body, seen: Observations, fitted: Fit) -> np.ndarray:
-    """(N, U) m, distance of each marker from where an answer puts it; NaN where lost."""
-    state = fitted.state
-    placed = place_points(state.placement, forward(body, state.pose), state.pose.betas)
-    return np.linalg.norm(seen.markers - placed, axis=2)
 
 
 def _mirrored_energy(

@@ -8,7 +8,7 @@ from solver.body.skeleton import JOINTS, PARENTS
 from solver.rotations import log_so3, mean_rotation
 from solver.solve.doubts.doubt import Doubt, Evidence
 
-LEAST = 0.65
+LEAST = 0.5
 FEWEST_JOINTS = 4
 _MOVES_DEG = 5.0
 _FRAMES = 400

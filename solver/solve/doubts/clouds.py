@@ -9,28 +9,30 @@ import numpy as np
 from solver.affinity import affinity
 from solver.solve.doubts.doubt import Doubt, Evidence, named, plural
 
-APART_M = 0.5
-"""Markers of one body have another one nearer than this."""
+APART_M, APART_SPARSE_M = 0.42, 0.5
+"""Markers of one body have another one nearer than this; the second where they are few and far between."""
+_SPARSE = 24
 _NEAR_M = 0.35
-_TOGETHER_M = 0.05
-"""Between the two, markers of one body also keep their distance."""
+_TOGETHER_M, _TOGETHER_NEAR_M = 0.05, 0.10
+"""Neighbours on one body also keep their distance: it varies by less than this, the less the further they are apart."""
 FEWEST = 3
 WHOLE = 8
 """From so many markers on a cloud may be a person to be solved."""
 _FRAMES = 200
+_FEW = 4.0
 
 
 def clouds(positions: np.ndarray) -> np.ndarray:
     """The cloud of each marker (M,), the one with the most markers first; -1 for those that belong to none.
 
-    Single linkage: two markers are linked that are 0.35 m apart (median over time), or 0.5 m if their distance also
-    stays within 50 mm (standard deviation). Clouds of fewer than three markers count as none.
+    Single linkage: two markers are linked that are within 0.35 m (median over time) of each other, their distance
+    varying by at most 100 mm (standard deviation), or within 0.42 m (0.5 m where there are fewer than 24 markers),
+    varying by at most 50 mm. Clouds of fewer than three markers count as none.
 
     Parameters
     ----------
     positions : (T, M, 3) m, NaN = lost
     """
-    from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
 
     count = positions.shape[1]
@@ -39,8 +41,10 @@ def clouds(positions: np.ndarray) -> np.ndarray:
     pairs = affinity(positions, _FRAMES)
     distance = _median_distance(positions)
     with np.errstate(invalid="ignore"):
-        linked = (distance < _NEAR_M) | ((distance < APART_M) & (pairs.deviation < _TOGETHER_M))
-    found = connected_components(csr_matrix(linked), directed=False)[1]
+        apart = APART_SPARSE_M if count < _SPARSE else APART_M
+        linked = (distance < _NEAR_M) & (pairs.deviation < _TOGETHER_NEAR_M)
+        linked |= (distance < apart) & (pairs.deviation < _TOGETHER_M)
+    found = connected_components(linked.astype(np.int8), directed=False)[1]
     sizes = np.bincount(found)
     order = np.argsort(-sizes, kind="stable")
     rank = np.full(len(sizes), -1)
@@ -61,22 +65,24 @@ def _median_distance(positions: np.ndarray) -> np.ndarray:
     return median
 
 
-def taken_cloud(cloud: np.ndarray, asked: int | None, match: Callable[[np.ndarray], float] | None) -> int:
-    """Number of the cloud to solve: the one asked for, else the one that moves as the video does, else the largest.
+def taken_cloud(cloud: np.ndarray, asked: int | None, cost: Callable[[np.ndarray], float]) -> int:
+    """Number of the cloud to solve: the one asked for, else of those that may be people the one nearest to the video.
 
     Parameters
     ----------
     cloud : (M,) as ``clouds`` gives them
     asked : counted from 1; one that is not there is left unheard
-    match : nats by which markers (their columns) move as the video does
+    cost : m^2, how far some markers (their columns) stay from the video's body, laid over them as well as it goes
     """
     sizes = np.bincount(cloud[cloud >= 0])
     if asked is not None and 1 <= asked <= len(sizes):
         return asked - 1
     people = np.flatnonzero(sizes >= WHOLE)
-    if match is None or len(people) < 2:
+    if len(people) < 2:
         return 0
-    return int(people[np.argmax([match(np.flatnonzero(cloud == c)) for c in people])])
+    # few markers come near to any body: the fewer, the less their distance says
+    costs = [cost(np.flatnonzero(cloud == c)) * (1 + _FEW / np.sqrt(sizes[c])) ** 2 for c in people]
+    return int(people[np.argmin(costs)])
 
 
 def several(seen: Evidence) -> Doubt | None:

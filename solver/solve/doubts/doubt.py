@@ -49,6 +49,7 @@ class Evidence:
     reprojection : px, median distance of the video's landmarks from the body's; NaN without landmarks
     image_size : (width, height) px
     sync_confidence : 0..1, of the offset between the clocks; 1 where it was given
+    sync_lead : nats by which the offset is ahead of every other that was tried; infinite where it was given
     still : columns of markers that stand while the others move
     cloud : (M,) number of the cloud that each marker belongs to, 0 the largest; -1 for none
     taken : number of the cloud that was solved
@@ -69,6 +70,7 @@ class Evidence:
     reprojection: float
     image_size: tuple[int, int]
     sync_confidence: float
+    sync_lead: float
     still: np.ndarray
     cloud: np.ndarray
     taken: int

@@ -6,12 +6,14 @@ from solver.body.skeleton import JOINTS
 from solver.solve.doubts.doubt import Doubt, Evidence
 
 LEAST_SYNC = 0.3
+LEAST_LEAD = 4.6
+"""Nats by which the offset must be ahead of every other, where the sync is not sure of it."""
 
 
 def lone_limb(seen: Evidence) -> Doubt | None:
-    """Say that left and right cannot be told apart where the offset is not known."""
+    """Say that left and right cannot be told apart where another offset is as good: half a cycle swaps the legs."""
     sides = {JOINTS[j].split("_")[0] for j in seen.joint if j >= 0 and "_" in JOINTS[j]}
-    if len(sides) != 1 or seen.sync_confidence >= LEAST_SYNC:
+    if len(sides) != 1 or seen.sync_confidence >= LEAST_SYNC or not seen.sync_lead < LEAST_LEAD:
         return None
     side = sides.pop()
     return Doubt(

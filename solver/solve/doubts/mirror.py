@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.body.skeleton import mirror_index
+from solver.body.skeleton import JOINTS, mirror_index
 from solver.solve.doubts.agreement import LEAST, agreement
 from solver.solve.doubts.doubt import Doubt, Evidence
 from solver.solve.doubts.picture import SHARE
@@ -31,6 +31,11 @@ def in_mirror(seen: Observations) -> Observations:
     image = seen.image[:, other].copy()
     image[..., 0] = seen.image_size[0] - image[..., 0]
     return replace(seen, prior=prior, image=image, visibility=seen.visibility[:, other])
+
+
+def both_sides(joint: np.ndarray) -> bool:
+    """Whether markers (M,) sit on the left and on the right: of a lone limb the mirror image is the other limb."""
+    return {"left", "right"} <= {JOINTS[j].split("_")[0] for j in joint if j >= 0}
 
 
 def video_in_doubt(rotations: np.ndarray, seen: Observations, joint: np.ndarray, reprojection: float) -> bool:
