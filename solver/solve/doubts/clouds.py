@@ -9,12 +9,12 @@ import numpy as np
 from solver.affinity import affinity
 from solver.solve.doubts.doubt import Doubt, Evidence, named, plural
 
-APART_M, APART_SPARSE_M = 0.42, 0.5
-"""Markers of one body have another one nearer than this; the second where they are few and far between."""
-_SPARSE = 24
-_NEAR_M = 0.35
-_TOGETHER_M, _TOGETHER_NEAR_M = 0.05, 0.10
-"""Neighbours on one body also keep their distance: it varies by less than this, the less the further they are apart."""
+NEAR_M, APART_M = 0.38, 0.42
+"""Neighbouring markers of one body are within the first of each other, in a pinch within the second."""
+_TOGETHER_NEAR_M, _TOGETHER_M = 0.10, 0.05
+"""They also keep their distance: it varies by less than this, the less the further they are apart."""
+ALONE_M, _SPARSE_ALONE_M, _SPARSE = 0.5, 0.7, 16
+"""A few markers (a raised hand's) belong to the cloud that is this near; the second where there are few in all."""
 FEWEST = 3
 WHOLE = 8
 """From so many markers on a cloud may be a person to be solved."""
@@ -25,9 +25,10 @@ _FEW = 4.0
 def clouds(positions: np.ndarray) -> np.ndarray:
     """The cloud of each marker (M,), the one with the most markers first; -1 for those that belong to none.
 
-    Single linkage: two markers are linked that are within 0.35 m (median over time) of each other, their distance
-    varying by at most 100 mm (standard deviation), or within 0.42 m (0.5 m where there are fewer than 24 markers),
-    varying by at most 50 mm. Clouds of fewer than three markers count as none.
+    Single linkage: two markers are linked that are within 0.38 m of each other (median over time), their distance
+    varying by at most 100 mm (standard deviation), or within 0.42 m, varying by at most 50 mm. What is then too small
+    to be a person (fewer than eight markers) goes to the nearest cloud if that is within 0.5 m (0.7 m where there are
+    fewer than sixteen markers in all). Clouds of fewer than three markers count as none.
 
     Parameters
     ----------
@@ -41,10 +42,10 @@ def clouds(positions: np.ndarray) -> np.ndarray:
     pairs = affinity(positions, _FRAMES)
     distance = _median_distance(positions)
     with np.errstate(invalid="ignore"):
-        apart = APART_SPARSE_M if count < _SPARSE else APART_M
-        linked = (distance < _NEAR_M) & (pairs.deviation < _TOGETHER_NEAR_M)
-        linked |= (distance < apart) & (pairs.deviation < _TOGETHER_M)
+        linked = (distance < NEAR_M) & (pairs.deviation < _TOGETHER_NEAR_M)
+        linked |= (distance < APART_M) & (pairs.deviation < _TOGETHER_M)
     found = connected_components(linked.astype(np.int8), directed=False)[1]
+    found = _gathered(found, distance, ALONE_M if count >= _SPARSE else _SPARSE_ALONE_M)
     sizes = np.bincount(found)
     order = np.argsort(-sizes, kind="stable")
     rank = np.full(len(sizes), -1)
@@ -52,6 +53,22 @@ def clouds(positions: np.ndarray) -> np.ndarray:
     rank[large] = np.arange(len(large))
     cloud: np.ndarray = rank[found]
     return cloud
+
+
+def _gathered(found: np.ndarray, distance: np.ndarray, near: float) -> np.ndarray:
+    """The clouds (M,) with each that is too small to be a person joined to the nearest one within ``near`` m."""
+    found = found.copy()
+    while True:
+        sizes = np.bincount(found)
+        best = (near, -1, -1)
+        for small in np.flatnonzero((sizes > 0) & (sizes < WHOLE)):
+            own = found == small
+            apart = np.where(own, np.inf, distance[own].min(axis=0))
+            nearest = int(apart.argmin())
+            best = min(best, (float(apart[nearest]), int(small), int(found[nearest])))
+        if best[1] < 0:
+            return found
+        found[found == best[1]] = best[2]
 
 
 def _median_distance(positions: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from solver.rotations import log_so3, mean_rotation
 from solver.solve.doubts.doubt import Doubt, Evidence
 
-SPREAD_DEG = 25.0
+SPREAD_DEG = 32.0
 DRIFT_DEG = 30.0
 
 
