@@ -341,8 +341,8 @@ def relax(
         coarse = next(fit for fit in chosen if fit.start is fine[0].start)
         left = _with_rival(problem, coarse, fine[0], left, base)
         if left and left[0].behind < _NEAR_RIVAL:
-            fine += [_advance(whole, closer_look(left[0]), phases=FINE[1:], base=base, judge=judge)]
-            fine.sort(key=lambda fit: fit.energies.total)
+            rival = _advance(whole, closer_look(left[0]), phases=FINE[1:], base=base, judge=judge)
+            fine = _basins([*fine, replace(rival, behind=float("nan"))])
             left = left[1:]
             say(fine)
     return tuple(fine) + tuple(left[:_SHOWN])

@@ -28,7 +28,7 @@ def judge(candidates: tuple[Candidate, ...], used: np.ndarray | None = None) -> 
     """
     best = candidates[0]
     rivals = [i for i, c in enumerate(candidates) if c.refined and i and not same_answer(best, c)]
-    rivals += [i for i, c in enumerate(candidates) if np.isfinite(c.behind)]
+    rivals += [i for i, c in enumerate(candidates) if not c.refined and np.isfinite(c.behind)]
     runner_up = rivals[0] if rivals else -1
     margin = _times(best, candidates[runner_up]) if rivals else float("inf")
     still = stillness(best.rotations, best.bone if used is None else best.bone[used])

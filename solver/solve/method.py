@@ -14,7 +14,7 @@ from solver.localize import Hypothesis, Search, hypotheses
 from solver.progress import Progress, silent
 from solver.rotations import log_so3
 from solver.solve.bundle import FINE, Fit, descend, relax, settled_again
-from solver.solve.doubts.clouds import clouds, taken_cloud
+from solver.solve.doubts.clouds import clouds, one_body, taken_cloud
 from solver.solve.doubts.mirror import both_sides, in_mirror, video_in_doubt
 from solver.solve.doubts.still import still_markers
 from solver.solve.ending import motion_from
@@ -61,7 +61,10 @@ def localize(
     cloud = np.full(seen.markers.shape[1], -1)
     cloud[wanted] = clouds(seen.markers[:, wanted])
     overlay = partial(_laid_over, body, seen, settings=settings, camera=camera)
-    taken = taken_cloud(cloud, settings.part_of_cloud, lambda own: overlay(own)[0][0].cost)
+    taken = 0
+    if cloud.max(initial=0) > 0:
+        cloud = one_body(cloud, lambda own: overlay(own)[0][0].cost)
+        taken = taken_cloud(cloud, settings.part_of_cloud, lambda own: overlay(own)[0][0].cost)
     used = within_reach(seen.markers, wanted[(cloud[wanted] == taken) | (cloud[wanted] < 0)])
     if len(used) < 3:
         raise InputError(

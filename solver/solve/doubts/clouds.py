@@ -15,6 +15,8 @@ _TOGETHER_NEAR_M, _TOGETHER_M = 0.10, 0.05
 """They also keep their distance: it varies by less than this, the less the further they are apart."""
 ALONE_M, _SPARSE_ALONE_M, _SPARSE = 0.5, 0.7, 16
 """A few markers (a raised hand's) belong to the cloud that is this near; the second where there are few in all."""
+COVERED_M = 0.2
+"""A cloud belongs to the body that comes this near to it (root mean square) while it covers another cloud, too."""
 FEWEST = 3
 WHOLE = 8
 """From so many markers on a cloud may be a person to be solved."""
@@ -100,6 +102,30 @@ def taken_cloud(cloud: np.ndarray, asked: int | None, cost: Callable[[np.ndarray
     # few markers come near to any body: the fewer, the less their distance says
     costs = [cost(np.flatnonzero(cloud == c)) * (1 + _FEW / np.sqrt(sizes[c])) ** 2 for c in people]
     return int(people[np.argmin(costs)])
+
+
+def one_body(cloud: np.ndarray, cost: Callable[[np.ndarray], float]) -> np.ndarray:
+    """The clouds (M,) with those joined that the video's body covers together: trunk and feet, an arm and a leg.
+
+    Parameters
+    ----------
+    cloud : (M,) as ``clouds`` gives them
+    cost : m^2, mean squared distance of some markers (their columns) from the video's body, laid over them as well as
+        it goes
+    """
+    main = taken_cloud(cloud, None, cost)
+    for other in range(int(cloud.max(initial=0)) + 1):
+        own, more = np.flatnonzero(cloud == main), np.flatnonzero(cloud == other)
+        if other == main or not len(own):
+            continue
+        both = np.concatenate([own, more])
+        square = (cost(both) * len(both) - cost(own) * len(own)) / len(more)
+        if square < COVERED_M**2:
+            cloud = np.where(cloud == other, main, cloud)
+    sizes = np.bincount(cloud[cloud >= 0], minlength=1)
+    order = np.argsort(-sizes, kind="stable")
+    rank = np.argsort(order)
+    return np.where(cloud >= 0, rank[cloud], -1)
 
 
 def several(seen: Evidence) -> Doubt | None:
