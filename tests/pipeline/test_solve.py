@@ -15,6 +15,8 @@ import pytest
 from solver.body.bones import with_bone_lengths
 from solver.body.model import Body
 from solver.errors import InputError
+from solver.io import load_markers
+from solver.io.export_c3d import write_c3d
 from solver.pipeline import solve_session
 from solver.pipeline.request import SolveRequest
 from solver.pipeline.session import load_session, save_session
@@ -156,6 +158,31 @@ def test_a_pinned_candidate_is_used_and_can_be_let_go(mine: Path) -> None:
     assert computed(SolveRequest(mine)) == set(), "the pin stays"
     assert computed(edited(mine, {})) == set(), "without it, the first answer is back"
     assert content(mine)["motion.npz"][1] == first["motion.npz"][1]
+
+
+def test_what_the_rules_find_is_in_every_output(made: Recording, tmp_path: Path) -> None:
+    """Two markers on a chair: left out, listed, said, and nobody's in the labelled file; the confidence is capped."""
+    markers = load_markers(made.markers)
+    chair = np.random.default_rng(0).normal([0.4, 0.3, 0.5], 0.0003, (len(markers.positions), 2, 3))
+    more = replace(
+        markers,
+        positions=np.concatenate([markers.positions, chair], axis=1),
+        labels=(*markers.labels, "seat", "back"),
+        filled=None,
+    )
+    write_c3d(tmp_path / "chair.c3d", more, up="z")
+    out = tmp_path / "out"
+    with_chair = replace(made, markers=tmp_path / "chair.c3d")
+    outcome = solve_session(session(out, with_chair, TINY, prior=made.prior, offset=made.offset), silent)
+    assert outcome.summary["nobodys_markers"] == ["seat", "back"]
+    (doubt,) = [one for one in outcome.summary["doubts"] if one["kind"] == "still markers"]
+    assert doubt["markers"] == ["seat", "back"] and doubt["value"] == 2
+    assert doubt["sentence"] in outcome.warnings and doubt["sentence"] in outcome.summary["warnings"]
+    assert outcome.summary["confidence"] <= 0.6
+    assert "seat, back" in (out / "report.html").read_text(encoding="utf-8")
+    named = load_markers(out / "markers_labelled.c3d").labels
+    assert {"unassigned_seat", "unassigned_back"} <= set(named)
+    json.dumps(outcome.summary)
 
 
 def test_a_marker_left_out_is_not_used(mine: Path) -> None:
