@@ -148,6 +148,10 @@ def test_a_planted_foot_and_a_person_who_stands_still_are_no_chair() -> None:
     assert not len(still_markers(np.zeros((T, 5, 3)) + np.arange(5)[None, :, None])), (
         "all stand: nothing moves past them"
     )
+    breathing = 0.003 * np.sin(np.linspace(0, 9, T))[:, None, None] + np.arange(5.0)[None, :, None]
+    breathing = np.repeat(breathing, 3, axis=2)
+    breathing[:, 0] = 0.0
+    assert not len(still_markers(breathing)), "of a person who stands a foot may not move at all"
 
 
 # clouds -------------------------------------------------------------------------------------------------------------
@@ -191,6 +195,8 @@ def test_the_cloud_nearest_to_the_video_is_taken_unless_another_is_asked_for() -
     cost = lambda columns: costs[int(cloud[columns[0]])]  # noqa: E731
     assert taken_cloud(cloud, None, cost) == 1, "three markers come near to anything: they are nobody to be solved"
     assert taken_cloud(cloud, 3, cost) == 2
+    limb_of_another = np.array([0] * 40 + [1] * 9)
+    assert taken_cloud(limb_of_another, None, lambda columns: costs[int(limb_of_another[columns[0]])]) == 0
     assert taken_cloud(cloud, 9, cost) == 1, "there is no ninth"
     assert taken_cloud(np.zeros(5, int), None, cost) == 0
 

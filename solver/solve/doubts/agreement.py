@@ -46,9 +46,8 @@ def agreement(rotations: np.ndarray, video: np.ndarray, tracked: np.ndarray, joi
 def _about_mean(rotations: np.ndarray) -> np.ndarray:
     """(T, J, 3) rad, rotation vectors about each joint's mean."""
     mean = mean_rotation(rotations)
-    turned = log_so3(np.swapaxes(mean, -1, -2) @ rotations)
-    centred: np.ndarray = turned - turned.mean(axis=0)
-    return centred
+    turned: np.ndarray = log_so3(np.swapaxes(mean, -1, -2) @ rotations)
+    return turned
 
 
 def disagreement(seen: Evidence) -> Doubt | None:

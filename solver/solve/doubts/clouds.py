@@ -20,6 +20,8 @@ COVERED_M = 0.2
 FEWEST = 3
 WHOLE = 8
 """From so many markers on a cloud may be a person to be solved."""
+_SHARE = 1 / 3
+"""One with fewer markers than this share of the largest cloud's is not solved instead of that one, unless asked for."""
 _FRAMES = 200
 _FEW = 4.0
 
@@ -96,7 +98,7 @@ def taken_cloud(cloud: np.ndarray, asked: int | None, cost: Callable[[np.ndarray
     sizes = np.bincount(cloud[cloud >= 0])
     if asked is not None and 1 <= asked <= len(sizes):
         return asked - 1
-    people = np.flatnonzero(sizes >= WHOLE)
+    people = np.flatnonzero(sizes >= max(WHOLE, _SHARE * sizes.max(initial=0)))
     if len(people) < 2:
         return 0
     # few markers come near to any body: the fewer, the less their distance says
