@@ -312,6 +312,13 @@ def test_a_shaking_camera_is_told_by_its_spread() -> None:
     assert doubt is not None and "to and fro" in doubt.sentence
 
 
+def test_a_limb_that_does_not_hold_the_pelvis_says_nothing_of_the_camera() -> None:
+    pan = exp_so3(np.linspace(0, 1.2, T)[:, None, None] * np.array([0, 1.0, 0])) @ moving()
+    assert turning_camera(sound(video=pan, joint=np.array([1, 2, 4, 5, 7, 8]))) is not None, "two legs do"
+    assert turning_camera(sound(video=pan, joint=np.array([1, 4, 7, 10, 1, 4]))) is None
+    assert turning_camera(sound(video=pan, joint=np.array([16, 17, 18, 19, 20, 21]))) is None
+
+
 def test_a_lone_limb_is_doubted_only_where_another_offset_is_as_good() -> None:
     leg = np.array([1, 4, 7, 10, 1, 4])
     assert lone_limb(sound(joint=leg, sync_confidence=0.2, sync_lead=0.3)) is not None

@@ -10,7 +10,7 @@ from solver.body.skeleton import JOINTS, mirror_index
 from solver.solve.doubts.agreement import LEAST, agreement
 from solver.solve.doubts.doubt import Doubt, Evidence
 from solver.solve.doubts.picture import SHARE
-from solver.solve.doubts.turn import DRIFT_DEG, SPREAD_DEG, camera_turn
+from solver.solve.doubts.turn import DRIFT_DEG, SPREAD_DEG, camera_turn, holds_pelvis
 from solver.solve.state import Observations
 from solver.video.lift import mirror_landmarks
 
@@ -40,7 +40,7 @@ def both_sides(joint: np.ndarray) -> bool:
 
 def video_in_doubt(rotations: np.ndarray, seen: Observations, joint: np.ndarray, reprojection: float) -> bool:
     """Whether an answer (N, 24, 3, 3) of the frames that are seen contradicts its video."""
-    spread, drift = camera_turn(rotations, seen.prior, seen.tracked)
+    spread, drift = camera_turn(rotations, seen.prior, seen.tracked) if holds_pelvis(joint) else (0.0, 0.0)
     limit = SHARE * max(seen.image_size)
     agree = agreement(rotations, seen.prior, seen.tracked, joint)
     return bool(agree < LEAST or spread > SPREAD_DEG or drift > DRIFT_DEG or reprojection > limit > 0)
