@@ -153,6 +153,9 @@ def _solve_options(solve: argparse.ArgumentParser) -> None:
     reading.add_argument("--units", choices=get_args(Units), help="length unit of the file")
     reading.add_argument("--marker-rate", type=float, metavar="HZ", help="frames a second")
     reading.add_argument("--subject", metavar="NAME", help="whose markers, where a file holds several people's")
+    reading.add_argument(
+        "--part-of-cloud", type=int, metavar="N", help="which of several clouds of markers to solve, counted from 1"
+    )
     reading.add_argument("--range", type=parse_range, metavar="A:B", help="seconds to solve, in the file's clock")
 
     timing = solve.add_argument_group("timing of the video (by default found from the motion)")

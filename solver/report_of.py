@@ -103,7 +103,7 @@ def _headlines(graph: GraphRun, motion: FittedMotion, ranked: Orientation) -> tu
     margin = f"next answer costs {ranked.margin:.2f} times" if np.isfinite(ranked.margin) else "no other answer found"
     camera = motion.camera
     rows = [
-        Headline("Confidence", f"{100 * motion.confidence:.0f} %", margin),
+        Headline("Confidence", f"{100 * graph['check'].confidence:.0f} %", margin),
         Headline("Marker residual", f"{1000 * np.nanmedian(motion.residual):.1f} mm", "median distance from its place"),
         Headline("Marker to skin", f"{1000 * surface.mean:.1f} mm", "mean; a marker's centre stands some 9.5 mm off"),
         Headline(

@@ -71,6 +71,14 @@ def kabsch(source: np.ndarray, target: np.ndarray, weights: np.ndarray | None = 
     return u @ vt
 
 
+def mean_rotation(rotations: np.ndarray) -> np.ndarray:
+    """(..., 3, 3), the rotation nearest to all of ``rotations`` (N, ..., 3, 3) by the sum of squared entries."""
+    u, _, vt = np.linalg.svd(rotations.mean(axis=0))
+    u[..., -1] *= np.sign(np.linalg.det(u) * np.linalg.det(vt))[..., None]
+    mean: np.ndarray = u @ vt
+    return mean
+
+
 def slerp(rotations: np.ndarray, times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """Rotations (F, J, 3, 3) at ``times`` (F,) s interpolated at ``wanted`` (T,) s; held beyond the ends."""
     if len(times) == 1:

@@ -31,6 +31,7 @@ _DECISIVE = 12.0  # nats that another clock ratio must bring
 # recordings of 3 to 14 s (benchmarks/sync_confidence.py draws others like them and shows how well it holds).
 _EVEN_ODDS = 7.4  # nats
 _STEEPNESS = 1.8
+_UNCOMPARED = 0.2  # confidence at most, where the recordings are too short for another offset to be compared
 
 
 @dataclass(frozen=True)
@@ -93,24 +94,36 @@ def find_offset(landmarks: Landmarks, markers: Markers, *, search: tuple[float, 
             "give the offset",
         )
     video, moved = _of_video(landmarks), _of_markers(markers)
+    _require_length(video.time, moved.time, landmarks.source)
     low, high = search or _likely(video.time, moved.time)
     lags = np.arange(low, high + 0.5 * _COARSE, _COARSE)
     score = _evidence(video, moved, lags)
     if not np.isfinite(score).any():
         raise InputError(
-            f"the video and the markers share less than {MIN_OVERLAP:g} s at offsets of {low:.1f} to {high:.1f} s",
+            f"the video and the markers share less than {MIN_OVERLAP:g} s in which both are seen, at offsets of "
+            f"{low:.1f} to {high:.1f} s",
             landmarks.source or None,
-            "give the offset, or a wider range to search",
+            "give the offset (--offset)"
+            if search is None
+            else "give the offset (--offset), or a wider range to search",
         )
     offset, peak = _refined(video, moved, float(lags[np.nanargmax(score)]), 1.0)
     rival, rival_score = _rival(lags, score, offset)
+    alone = not np.isfinite(rival_score)
     margin = max(0.0, peak - max(rival_score, _chance(video, moved, lags)))
     confidence = margin**_STEEPNESS / (margin**_STEEPNESS + _EVEN_ODDS**_STEEPNESS)
+    confidence = min(confidence, _UNCOMPARED) if alone else confidence
     ratio, offset = _clock_ratio(video, moved, offset, peak)
     notes = []
     if ratio != 1.0:
         notes.append(f"The clocks run at a ratio of {ratio:.4f} (29.97 against 30 frames a second).")
-    if confidence < 0.5:
+    if alone:
+        shared = min(video.time[-1] - video.time[0], moved.time[-1] - moved.time[0])
+        notes.append(
+            f"The recordings are too short ({shared:.2f} s) to compare the offset between video and markers with "
+            f"others: {offset:.2f} s is a guess; give the offset if you know it."
+        )
+    elif confidence < 0.5:
         notes.append(
             f"The motion does not settle the offset between video and markers: {offset:.2f} s is hardly better than "
             f"{rival:.2f} s; give the offset if you know it."
@@ -118,10 +131,34 @@ def find_offset(landmarks: Landmarks, markers: Markers, *, search: tuple[float, 
     return Sync(offset, ratio, confidence, lags, score, margin, notes=tuple(notes))
 
 
+def lead(sync: Sync) -> float:
+    """Nats by which the offset is ahead of every other; infinite where no other was judged."""
+    if not np.isfinite(sync.score).any():
+        return float("inf")
+    return float(np.nanmax(sync.score)) - _rival(sync.lags, sync.score, sync.offset)[1]
+
+
 def _likely(video: np.ndarray, markers: np.ndarray) -> tuple[float, float]:
-    """Offsets, s, at which the shorter recording lies within the longer, and somewhat beyond."""
+    """Offsets, s, at which the shorter recording lies within the longer, and somewhat beyond.
+
+    Not so far that they share too little to be judged.
+    """
     ends = (markers[0] - video[0], markers[-1] - video[-1])
-    return min(ends) - _SLACK, max(ends) + _SLACK
+    least, most = markers[0] - video[-1] + MIN_OVERLAP, markers[-1] - video[0] - MIN_OVERLAP
+    return max(min(ends) - _SLACK, least), min(max(ends) + _SLACK, most)
+
+
+def _require_length(video: np.ndarray, markers: np.ndarray, source: str) -> None:
+    """Refuse recordings (times, s) that cannot share as much as an offset needs to be judged."""
+    for what, time in (("video", video), ("markers", markers)):
+        seconds, lasts = time[-1] - time[0], "lasts" if what == "video" else "last"
+        if seconds < MIN_OVERLAP:
+            raise InputError(
+                f"the {what} {lasts} {seconds:.2f} s, and {MIN_OVERLAP:g} s of movement are "
+                "needed to find the offset between video and markers",
+                source or None,
+                "give the offset (--offset)",
+            )
 
 
 def _refined(video: _Motion, markers: _Motion, lag: float, ratio: float) -> tuple[float, float]:
@@ -140,7 +177,7 @@ def _refined(video: _Motion, markers: _Motion, lag: float, ratio: float) -> tupl
 
 
 def _rival(lags: np.ndarray, score: np.ndarray, offset: float) -> tuple[float, float]:
-    """The best offset outside of the peak, s, and its evidence, nats."""
+    """The best offset outside of the peak, s, and its evidence, nats; minus infinity where none could be judged."""
     elsewhere = np.where((np.abs(lags - offset) > _PEAK_WIDTH) & np.isfinite(score), score, -np.inf)
     rival = int(elsewhere.argmax())
     return float(lags[rival]), float(elsewhere[rival])

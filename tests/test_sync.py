@@ -11,7 +11,7 @@ import pytest
 
 from solver.errors import InputError
 from solver.markers import Markers
-from solver.sync import find_offset
+from solver.sync import Sync, find_offset, lead
 from solver.video.landmarks import Landmarks
 
 OFFSET = 1.234  # s
@@ -157,6 +157,35 @@ def test_a_given_range_is_kept_and_one_without_overlap_is_refused() -> None:
     assert abs(found.offset - OFFSET) < 0.01 and found.lags[0] == 1.0 and found.lags[-1] <= 1.5 + 1e-9
     with pytest.raises(InputError, match="share less than"):
         find_offset(video, markers, search=(20.0, 22.0))
+
+
+def test_a_trial_too_short_for_a_rival_claims_none() -> None:
+    """No other offset can be judged in 1.25 s: none is named, least of all one at the end of the range searched."""
+    path = dancer(9)
+    found = find_offset(filmed(path, np.arange(0, 1.25, 1 / 30), 9), captured(path, np.arange(0, 1.25, 0.01), 9))
+    assert np.abs(found.lags).max() <= 0.3, "further apart they share less than a second"
+    assert found.confidence <= 0.2
+    (note,) = found.notes
+    assert "too short (1.2" in note and "-2.00" not in note and "hardly better" not in note
+
+
+@pytest.mark.parametrize("short", ["video", "markers"])
+def test_a_trial_under_a_second_is_refused_with_what_can_be_done(short: str) -> None:
+    path = dancer(9)
+    lasts = {"video": 8.0, "markers": 8.0, short: 0.85}
+    video = filmed(path, np.arange(0, lasts["video"], 1 / 30), 9)
+    markers = captured(path, np.arange(0, lasts["markers"], 0.01), 9)
+    with pytest.raises(InputError, match=rf"the {short} lasts? 0.8\d? s, and 1 s of movement") as refused:
+        find_offset(video, markers)
+    assert "--offset" in str(refused.value) and "range" not in str(refused.value)
+
+
+def test_the_lead_is_that_over_every_offset_outside_the_peak() -> None:
+    lags = np.arange(-1, 1.01, 0.05)
+    score = np.where(np.abs(lags) < 0.2, 30.0, 10.0)
+    score[2] = 27.0
+    assert lead(Sync(0.0, 1.0, 0.2, lags, score)) == pytest.approx(3.0)
+    assert lead(Sync(0.0, 1.0, 1.0, lags[:1], np.array([np.nan]))) == np.inf
 
 
 def test_too_little_to_compare_is_refused() -> None:

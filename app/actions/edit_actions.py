@@ -132,6 +132,26 @@ def _not_pinned(bench: Workbench) -> str:
     return "" if getattr(bench.board.settings.get("fit"), "candidate", None) is not None else "no candidate is pinned"
 
 
+def _cloud(bench: Workbench, asks: Asks) -> None:
+    found, labels = bench.board.current["localize"], bench.board.current["markers"].labels
+    sizes = np.bincount(found.cloud[found.cloud >= 0])
+    members = [[labels[m] for m in np.flatnonzero(found.cloud == c)] for c in range(len(sizes))]
+    options = [
+        f"Cloud {c + 1}, {len(own)} markers: {', '.join(own[:4])}{' …' if len(own) > 4 else ''}"
+        for c, own in enumerate(members)
+    ]
+    place = asks.choice("Solve the markers of", options)
+    if place is not None:
+        bench.document.apply(edits.choose_cloud(bench.document.session, place + 1))
+
+
+def _one_cloud(bench: Workbench) -> str:
+    if reason := needs("localize", "the markers have not been placed yet")(bench):
+        return reason
+    cloud = getattr(bench.board.current["localize"], "cloud", np.zeros(0, dtype=int))
+    return "" if cloud.max(initial=0) > 0 else "the markers form one cloud"
+
+
 def _found_offset(bench: Workbench, asks: Asks) -> None:
     bench.document.apply(edits.find_offset(bench.document.session))
 
@@ -255,6 +275,14 @@ EDIT_ACTIONS = (
         _leave_ghosts,
         "Shift+Esc",
         _no_ghost,
+    ),
+    Action(
+        "cloud.choose",
+        "Solve another cloud of markers...",
+        "Edit",
+        "Where the markers form several clouds (two people in one file), choose the one that is solved.",
+        _cloud,
+        why_not=_one_cloud,
     ),
     Action(
         "offset.found",

@@ -25,6 +25,7 @@ DECISIONS = {
     "clean": ("keep", "swaps", "joins"),
     "sync": ("offset", "rate_ratio"),
     "segment": ("threshold", "groups", "merges", "splits", "moves", "left_out"),
+    "localize": ("part_of_cloud",),
     "fit": ("candidate",),
 }
 """Settings that are decided for one recording."""
@@ -125,6 +126,11 @@ def unpin_candidate(session: Session) -> Edit:
     if "candidate" in after.settings.get("fit", {}):
         after = decide(after, "fit", {"candidate": None})
     return Edit("No candidate pinned", after)
+
+
+def choose_cloud(session: Session, number: int) -> Edit:
+    """Solve this one of several clouds of markers, counted from 1."""
+    return Edit(f"Solve cloud {number} of the markers", decide(session, "localize", {"part_of_cloud": int(number)}))
 
 
 def set_method(session: Session, method: Method) -> Edit:

@@ -30,6 +30,7 @@ TITLES = {
     "fit": "Fit",
     "angles": "Joint angles",
     "surface": "Distance to the skin",
+    "check": "Doubts",
 }
 _COUNTED = "fit", "candidate"
 """The setting that is a row, and is shown as a candidate's number."""

@@ -31,6 +31,7 @@ def kept_decisions(before: Session, edit: Edit) -> Edit:
     columns = _columns(before) != _columns(after)
     for stage, names, moved, said in (
         ("segment", _BY_COLUMN, columns, "groups made by hand are as the cut makes them"),
+        ("localize", ("part_of_cloud",), columns, "the cloud to solve is chosen by the program again"),
         ("clean", _BY_FRAME, columns or _start(before) != _start(after), "edits of tracks are taken back"),
     ):
         table = after.edits.get(stage, {})

@@ -28,6 +28,7 @@ RANGES: dict[tuple[str, str], tuple[float, float]] = {
     ("localize", "many"): (2, 1000),
     ("localize", "keep"): (1, 200),
     ("localize", "seen_share"): (0.001, 1),
+    ("localize", "part_of_cloud"): (1, _MOST_MARKERS),
     ("localize", "rate"): (1, 1000),
     ("localize", "shared"): (0, 1),
     ("localize", "whole_body"): (0, 2),

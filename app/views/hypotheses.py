@@ -9,6 +9,7 @@ import numpy as np
 from app.views.colours import RGB, rgb
 from solver.solve.confidence import same_answer
 from solver.solve.counting import candidate_number
+from solver.solve.doubts.rules import Verdict
 from solver.solve.paper.results import PaperSolve
 from solver.solve.results import Candidate, Orientation
 from widgets import palette
@@ -84,7 +85,10 @@ class HypothesesPicture:
 
 
 def hypotheses_picture(
-    ranked: Orientation, in_use: int | None = None, solved: PaperSolve | None = None
+    ranked: Orientation,
+    in_use: int | None = None,
+    solved: PaperSolve | None = None,
+    verdict: Verdict | None = None,
 ) -> HypothesesPicture:
     """The answers to compare.
 
@@ -93,6 +97,7 @@ def hypotheses_picture(
     Parameters
     ----------
     in_use : row of the candidate that the fit goes on from
+    verdict : what the rules say of the result, where they were asked
     solved : of the published method, whose bars then show the terms of stage 4; the ranking is by the distance alone
     """
     rows = [i for i, candidate in enumerate(ranked.candidates) if candidate.refined]
@@ -119,7 +124,7 @@ def hypotheses_picture(
             )
         )
     highest = max((sum(term.value for term in card.terms) for card in cards), default=0.0)
-    sentence = _sentence(ranked)
+    sentence = _sentence(ranked, verdict)
     if in_use is not None and in_use not in rows and in_use < len(ranked.candidates):
         sentence += f" The fit goes on from candidate {candidate_number(in_use)}, which the search had left behind."
     return HypothesesPicture(tuple(cards), highest, sentence)
@@ -135,9 +140,11 @@ def _term_names(ranked: Orientation, rows: list[int], solved: PaperSolve | None)
     return known + [name for name in dict.fromkeys(found) if name not in TERMS]
 
 
-def _sentence(ranked: Orientation) -> str:
-    sure = f"confidence {100 * ranked.confidence:.0f} %"
+def _sentence(ranked: Orientation, verdict: Verdict | None) -> str:
+    confidence = ranked.confidence if verdict is None else verdict.confidence
+    doubts = "" if verdict is None else "".join(f" {doubt.sentence}" for doubt in verdict.doubts)
+    sure = f"confidence {100 * confidence:.0f} %"
     if ranked.runner_up < 0 or not np.isfinite(ranked.margin):
-        return f"No different answer was found; {sure}."
+        return f"No different answer was found; {sure}.{doubts}"
     other = f"{candidate_number(ranked.runner_up)}: {ranked.candidates[ranked.runner_up].part}"
-    return f"The next different answer ({other}) costs {ranked.margin:.2f} times as much; {sure}."
+    return f"The next different answer ({other}) costs {ranked.margin:.2f} times as much; {sure}.{doubts}"

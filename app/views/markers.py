@@ -9,6 +9,7 @@ import numpy as np
 from app.views.colours import bone_name
 from app.views.tracks import MEASURED, MarkerTracks
 from solver.segment import Segmentation
+from solver.solve.doubts.rules import Verdict
 from solver.solve.results import FittedMotion
 
 
@@ -23,7 +24,8 @@ class MarkerTable:
     gaps : stretches without a measurement, those at the ends included
     longest_gap : s
     group : of markers that move together, counted from 1; 0 for none
-    bone : the bone it was given to, "" for none
+    bone : the bone it was given to, "" for none; with "(doubtful)" where it stays over 20 mm from its place, "nobody's"
+        where it was left out as somebody else's or a thing's
     mean, p95, worst : mm, distance from where the body puts it; NaN where it was not used
     worst_frame : frame of the worst, -1 without any
     worst_time : s, marker clock
@@ -43,9 +45,12 @@ class MarkerTable:
 
 
 def marker_table(
-    tracks: MarkerTracks, segmentation: Segmentation | None = None, motion: FittedMotion | None = None
+    tracks: MarkerTracks,
+    segmentation: Segmentation | None = None,
+    motion: FittedMotion | None = None,
+    verdict: Verdict | None = None,
 ) -> MarkerTable:
-    """The markers of a session as far as they are known."""
+    """The markers of a session as far as they are known; those that the rules doubt are marked beside their bone."""
     width = tracks.state.shape[1]
     measured = tracks.state == MEASURED
     gaps, longest = gap_lengths(~measured)
@@ -58,13 +63,23 @@ def marker_table(
         gaps=gaps,
         longest_gap=longest / tracks.markers.rate,
         group=1 + (nothing if segmentation is None else segmentation.clusters),
-        bone=tuple(bone_name(int(j)) for j in joints),
+        bone=_bones(joints, verdict),
         mean=mean,
         p95=p95,
         worst=worst,
         worst_frame=frame,
         worst_time=np.where(frame < 0, np.nan, tracks.markers.first_time + frame / tracks.markers.rate),
     )
+
+
+def _bones(joints: np.ndarray, verdict: Verdict | None) -> tuple[str, ...]:
+    names = [bone_name(int(j)) for j in joints]
+    if verdict is not None and max((*verdict.nobody, *verdict.suspect), default=-1) < len(names):
+        for m in verdict.suspect:
+            names[m] += " (doubtful)"
+        for m in verdict.nobody:
+            names[m] = "nobody's"
+    return tuple(names)
 
 
 def gap_lengths(lost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

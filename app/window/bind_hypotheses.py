@@ -51,7 +51,9 @@ class HypothesesBinder:
             self._timer.start()
         fit = self.bench.board.settings.get("fit") if self.bench.document.is_open else None
         before = self._picture
-        self._picture = hypotheses_picture(ranked, getattr(fit, "candidate", None) or 0, self.shown.get("solve"))
+        verdict = None if self.shown.stale("check") else self.shown.get("check")
+        row = getattr(fit, "candidate", None) or 0
+        self._picture = hypotheses_picture(ranked, row, self.shown.get("solve"), verdict)
         if repr(self._picture) != repr(before):  # which takes NaN for NaN
             self._show()
 
@@ -62,7 +64,7 @@ class HypothesesBinder:
         self._select()
 
     def _changed(self, stages: frozenset[str]) -> None:
-        if stages & {"orient", "solve", "localize", "fit"}:
+        if stages & {"orient", "solve", "localize", "fit", "check"}:
             self.fill()
 
     def _select(self) -> None:

@@ -25,7 +25,7 @@ class MarkersBinder:
         widget.worst_requested.connect(self._worst)
 
     def _changed(self, stages: frozenset[str]) -> None:
-        if stages & {"markers", "clean", "segment", "fit"}:
+        if stages & {"markers", "clean", "segment", "fit", "check"}:
             self._filling.start()
 
     def _fill(self) -> None:
@@ -33,8 +33,11 @@ class MarkersBinder:
         if tracks is None:
             return
         segmentation, motion = self.shown.segmentation, self.shown.fit
+        verdict = None if self.shown.stale("check") else self.shown.get("check")
         rows = self.shown.once(
-            "marker rows", (tracks, segmentation, motion), lambda: marker_table(tracks, segmentation, motion)
+            "marker rows",
+            (tracks, segmentation, motion, verdict),
+            lambda: marker_table(tracks, segmentation, motion, verdict),
         )
         clusters = self.shown.clusters
         self.widget.set_rows(rows, None if clusters is None else by_cluster(clusters).colours)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 WANTED = (
     "markers", "clean", "landmarks", "prior", "sync", "segment", "localize", "solve", "orient", "fit", "angles",
+    "check",
 )  # fmt: skip
 
 

@@ -180,9 +180,19 @@ def labelled(given: Given, settings: Mapping[str, Any], progress: Progress = sil
 
 
 def run_stages(
-    name: Method, given: Given, settings: Mapping[str, Any], wanted: str, progress: Progress
+    name: Method,
+    given: Given,
+    settings: Mapping[str, Any],
+    wanted: str,
+    progress: Progress,
+    known: Mapping[str, Any] | None = None,
 ) -> tuple[dict[str, Any], dict[str, float]]:
-    """The results and times, s, of all stages of a method's graph that lead to ``wanted``: the very ones of a solve."""
+    """The results and times, s, of all stages of a method's graph that lead to ``wanted``: the very ones of a solve.
+
+    Parameters
+    ----------
+    known : results of stages that are not to be run
+    """
     stages = {stage.name: stage for stage in GRAPHS[name]}
     results: dict[str, Any] = {
         "markers": given.markers,
@@ -191,6 +201,7 @@ def run_stages(
         "body_file": given.body,
         "camera_file": None,
         "weights_file": None,
+        **(known or {}),
     }
     seconds: dict[str, float] = {}
 

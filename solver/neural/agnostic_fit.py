@@ -12,7 +12,7 @@ from solver.neural.agnostic_solve import Marked
 from solver.progress import Progress, silent
 from solver.solve.bundle import FINE, descend
 from solver.solve.kinematics import Points, Pose
-from solver.solve.method import chosen_row, fitted_motion, state_of
+from solver.solve.method import chosen_row, fitted_motion, in_use, state_of
 from solver.solve.problem import Problem
 from solver.solve.refine import every_frame, set_on_markers
 from solver.solve.results import Candidate, FittedMotion, Localization, Orientation
@@ -95,7 +95,7 @@ def fit_from_network(
     poses : of the candidate that goes on
     """
     chosen = ranked.candidates[chosen_row(ranked, settings)]
-    used = replace(seen, markers=seen.markers[:, found.markers])
+    used = in_use(seen, found, ranked)
     frames = found.many if chosen.refined else found.few
     state, surface = state_of(chosen, used)
     usual = poses.rotations.copy()

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from solver.pipeline.cleaning import notes_of
 from solver.pipeline.stage import GraphRun
-
-_BAD_FIT_M = 0.03
-"""A right answer leaves markers within a few millimetres of their places; beyond this it is no longer a body."""
+from solver.solve.doubts.doubt import named, plural
+from solver.solve.doubts.far import SUSPECT_M
 
 
 def assumptions(graph: GraphRun) -> tuple[str, ...]:
-    """What was assumed while the files were read."""
-    return (*graph["markers"].notes, *notes_of(graph["clean"]), *graph["prior"].notes)
+    """What was assumed while the files were read, and which markers deserve a look."""
+    return (*graph["markers"].notes, *notes_of(graph["clean"]), *graph["prior"].notes, *_suspects(graph))
 
 
 def doubts(graph: GraphRun) -> tuple[str, ...]:
     """What speaks against the result."""
-    motion = graph["fit"]
-    residual = float(np.nanmedian(motion.residual))
-    misfit: tuple[str, ...] = ()
-    if not residual < _BAD_FIT_M:
-        misfit = (
-            f"The markers are {1000 * residual:.0f} mm from where the body puts them (median): this is no fit to "
-            "rely on; check units, vertical axis, and that markers and video are of the same movement.",
-        )
-    return (*misfit, *graph["sync"].notes, *motion.warnings)
+    found = graph["check"].doubts
+    return (*(doubt.sentence for doubt in found), *graph["sync"].notes, *graph["fit"].warnings)
+
+
+def _suspects(graph: GraphRun) -> tuple[str, ...]:
+    suspect, labels = graph["check"].suspect, graph["markers"].labels
+    if not suspect:
+        return ()
+    return (
+        f"{plural(len(suspect), 'marker')} stay over {1000 * SUSPECT_M:.0f} mm from their places "
+        f"({named(labels, suspect)}): most of such sit on another bone than they were given to.",
+    )

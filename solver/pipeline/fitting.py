@@ -6,11 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from solver.angles import AngleSettings, JointAngles
 from solver.pipeline.cleaning import measured
 from solver.pipeline.stage import NoSettings
 from solver.progress import Progress
 from solver.segment import Segmentation, SegmentSettings
+from solver.solve.doubts.rules import Verdict
 from solver.solve.results import CameraResult, FittedMotion, Localization, Orientation
 from solver.solve.settings import FitSettings, LocalizeSettings, OrientSettings
 from solver.surface import SurfaceDistance
@@ -50,7 +53,8 @@ def place_markers(given: Mapping[str, Any], settings: LocalizeSettings, progress
 
     body, seen, _ = scene(given)
     left_out = given["segment"].clusters < 0
-    return localize(body, seen, left_out, settings, _camera(given["camera_file"], seen.image_size))
+    camera = _camera(given["camera_file"], seen.image_size)
+    return localize(body, seen, left_out, settings, camera)
 
 
 def rank_placements(given: Mapping[str, Any], settings: OrientSettings, progress: Progress) -> Orientation:
@@ -94,3 +98,37 @@ def measure_surface(given: Mapping[str, Any], settings: NoSettings, progress: Pr
     from solver.surface import surface_distance
 
     return surface_distance(_body(given), given["fit"], measured(given["clean"]).positions, progress)
+
+
+def check_result(given: Mapping[str, Any], settings: NoSettings, progress: Progress) -> Verdict:
+    """What speaks against the result, by every rule there is."""
+    from solver.solve.doubts.doubt import Evidence
+    from solver.solve.doubts.rules import verdict
+    from solver.solve.observe import on_clock
+    from solver.sync import lead
+
+    motion, surface, sync, found = given["fit"], given["surface"], given["sync"], given["localize"]
+    ranked: Orientation = given["orient"]
+    video, tracked = on_clock(given["prior"], motion.time, sync.offset, sync.rate_ratio)
+    nothing = np.zeros(0, dtype=int)
+    evidence = Evidence(
+        labels=given["clean"].markers.labels,
+        joint=motion.marker_joint,
+        residual=motion.residual,
+        skin=surface.per_marker,
+        m2s=surface.mean,
+        affinity=given["segment"].affinity,
+        rotations=motion.rotations,
+        video=video,
+        tracked=tracked,
+        reprojection=motion.camera.reprojection_px,
+        image_size=motion.camera.image_size,
+        sync_confidence=sync.confidence,
+        sync_lead=lead(sync),
+        still=getattr(found, "still", nothing),  # the published method leaves nothing out
+        cloud=getattr(found, "cloud", nothing),
+        taken=getattr(found, "taken", 0),
+        far=ranked.far,
+        mirror=ranked.mirror,
+    )
+    return verdict(evidence, motion.confidence)

@@ -33,6 +33,7 @@ class SolveRequest:
     units : length unit of the marker file
     subject : whose markers to take where a file holds several people's
     marker_rate : Hz, frame rate of the marker file where it does not say
+    part_of_cloud : which of several clouds of markers to solve, counted from 1, where two people are in one file
     range : (start, stop) s in the marker file's clock, either may be None
     method : how the body is fitted
     iterations : of each optimisation at most, for the paper's method
@@ -53,6 +54,7 @@ class SolveRequest:
     units: Units | None = None
     subject: str | None = None
     marker_rate: float | None = None
+    part_of_cloud: int | None = None
     range: tuple[float | None, float | None] | None = None
     method: Method | None = None
     iterations: int | None = None
@@ -75,8 +77,10 @@ class SolveRequest:
             value = getattr(self, name)
             if value is not None and value <= 0:
                 raise InputError(f"{value:g} is not possible", option(name), "give a number above 0")
-        if self.iterations is not None and self.iterations < 1:
-            raise InputError(f"{self.iterations} is not possible", option("iterations"), "give 1 or more")
+        for name in ("iterations", "part_of_cloud"):
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise InputError(f"{value} is not possible", option(name), "give 1 or more")
         if self.seed is not None and self.seed < 0:
             raise InputError(f"{self.seed} is not possible", option("seed"), "give 0 or a positive whole number")
         if self.range is not None:

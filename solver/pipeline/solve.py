@@ -27,6 +27,7 @@ from solver.pipeline.source import contents
 from solver.pipeline.stage import GraphRun, OnEvent, ignore, run_graph, stage_keys
 from solver.pipeline.stages import SOURCES
 from solver.progress import Progress, part_of, silent
+from solver.solve.doubts.doubt import Doubt
 from solver.solve.results import Candidate
 
 _WORTH_KEEPING_S = 5.0
@@ -159,6 +160,7 @@ def _said(request: SolveRequest) -> dict[str, dict[str, Any]]:
             "rate": request.marker_rate,
         },
         "sync": {"offset": request.offset, "rate_ratio": request.rate_ratio},
+        **({} if request.part_of_cloud is None else {"localize": {"part_of_cloud": request.part_of_cloud}}),
         "angles": {"convention": request.convention},
     }
     said = {
@@ -205,7 +207,7 @@ def _tidy(session: Session) -> Iterator[None]:
 
 def _outcome(session: Session, graph: GraphRun, not_kept: tuple[str, ...] = ()) -> SolveOutcome:
     motion, ranked, sync, surface = graph["fit"], graph["orient"], graph["sync"], graph["surface"]
-    markers = graph["markers"]
+    markers, found = graph["markers"], graph["check"]
     best = ranked.candidates[motion.chosen]
     summary = {
         "out": str(session.folder),
@@ -218,12 +220,15 @@ def _outcome(session: Session, graph: GraphRun, not_kept: tuple[str, ...] = ()) 
         "energies": dict(best.energies),
         "energy": best.energy,
         "margin": ranked.margin if np.isfinite(ranked.margin) else None,
-        "confidence": motion.confidence,
+        "confidence": found.confidence,
         "runner_up": None if ranked.runner_up < 0 else _brief(ranked.candidates[ranked.runner_up]),
         "alternatives": [_brief(candidate) for candidate in ranked.candidates if candidate.refined],
         "sync": {"offset_s": sync.offset, "rate_ratio": sync.rate_ratio, "confidence": sync.confidence},
         "m2s_mm": 1000 * surface.mean,
         "residual_median_mm": float(1000 * np.nanmedian(motion.residual)),
+        "doubts": [_doubt(doubt, markers.labels) for doubt in found.doubts],
+        "nobodys_markers": [markers.labels[m] for m in found.nobody],
+        "suspect_markers": [markers.labels[m] for m in found.suspect],
     }
     said, doubted = (*assumptions(graph), *not_kept), doubts(graph)
     lines = (
@@ -233,6 +238,17 @@ def _outcome(session: Session, graph: GraphRun, not_kept: tuple[str, ...] = ()) 
     )
     summary |= {"notes": list(said), "warnings": list(doubted)}
     return SolveOutcome(summary=summary, lines=lines, warnings=doubted, out=session.folder)
+
+
+def _doubt(doubt: Doubt, labels: tuple[str, ...]) -> dict[str, Any]:
+    """A doubt in plain JSON values."""
+    return {
+        "kind": doubt.kind,
+        "sentence": doubt.sentence,
+        "markers": [labels[m] for m in doubt.markers],
+        "value": doubt.value if np.isfinite(doubt.value) else None,
+        "limit": doubt.limit if np.isfinite(doubt.limit) else None,
+    }
 
 
 def _brief(candidate: Candidate) -> dict[str, Any]:

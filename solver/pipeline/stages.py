@@ -13,6 +13,7 @@ from solver.pipeline.inputs import LandmarkSettings, MarkerSettings, PriorSettin
 from solver.pipeline.stage import NoSettings, Stage
 from solver.prior import PosePrior
 from solver.segment import Segmentation, SegmentSettings
+from solver.solve.doubts.rules import Verdict
 from solver.solve.results import FittedMotion, Localization, Orientation
 from solver.solve.settings import FitSettings, LocalizeSettings, OrientSettings
 from solver.surface import SurfaceDistance
@@ -55,7 +56,7 @@ def said_orientation(ranked: Orientation) -> str:
     margin = (
         "no other answer" if ranked.runner_up < 0 else f"next different answer costs {ranked.margin:.2f} times as much"
     )
-    return f"{best.part}; {margin}; confidence {ranked.confidence:.2f}"
+    return f"{best.part}; {margin}"
 
 
 def said_fit(motion: FittedMotion) -> str:
@@ -70,6 +71,11 @@ def said_fit(motion: FittedMotion) -> str:
 
 def _said_surface(found: SurfaceDistance) -> str:
     return f"markers {1000 * found.mean:.1f} mm from the skin (m2s)"
+
+
+def _said_check(found: Verdict) -> str:
+    kinds = ", ".join(doubt.kind for doubt in found.doubts)
+    return f"confidence {found.confidence:.2f}; {f'in doubt: {kinds}' if kinds else 'no rule speaks against it'}"
 
 
 def _said_angles(angles: JointAngles) -> str:
@@ -99,7 +105,7 @@ GRAPH = (
     Stage("segment", 1, SegmentSettings, ("clean",), fitting.group_markers, Segmentation, said_segmentation, cost=0.3),
     Stage(
         "localize",
-        3,
+        4,
         LocalizeSettings,
         (*FITTED_TO, "segment", "camera_file"),
         fitting.place_markers,
@@ -109,7 +115,7 @@ GRAPH = (
     ),
     Stage(
         "orient",
-        6,
+        7,
         OrientSettings,
         (*FITTED_TO, "localize", "camera_file"),
         fitting.rank_placements,
@@ -137,6 +143,16 @@ GRAPH = (
         SurfaceDistance,
         _said_surface,
         cost=2,
+    ),
+    Stage(
+        "check",
+        1,
+        NoSettings,
+        ("clean", "prior", "sync", "segment", "localize", "orient", "fit", "surface"),
+        fitting.check_result,
+        Verdict,
+        _said_check,
+        cost=0.1,
     ),
 )
 """Every stage of the default method."""

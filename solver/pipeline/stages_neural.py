@@ -68,7 +68,7 @@ def _poses(given: Mapping[str, Any], settings: NetworkSettings, row: int, progre
     from solver.neural.agnostic_trust import blended
     from solver.neural.posing import pose_network
     from solver.solve.kinematics import Points, Pose, forward, place_points
-    from solver.solve.method import fit
+    from solver.solve.method import fit, in_use
     from solver.solve.settings import FitSettings
 
     body, seen, landmarks = scene_of(given)
@@ -78,7 +78,7 @@ def _poses(given: Mapping[str, Any], settings: NetworkSettings, row: int, progre
     if settings.tune_steps:
         network = network.tuned(settings.tune_steps, part_of(progress, 0.0, 0.8))
     usual = fit(body, seen, landmarks, found, ranked, cleaned.time, FitSettings(row), part_of(progress, 0.8, 0.9))
-    markers = seen.markers[:, found.markers]
+    markers = in_use(seen, found, ranked).markers
     solved = network.poses(markers, cleaned.rate, part_of(progress, 0.9, 1.0))
     blend = blended(solved.rotations, usual.rotations, network.expected_errors(), settings.default_deg)
     own = Pose(solved.rotations, solved.trans, chosen.betas)

@@ -18,6 +18,7 @@ from solver.localize import Hypothesis
 from solver.parallel import spread
 from solver.progress import Found, Progress, silent, tell
 from solver.rotations import log_so3
+from solver.solve.confidence import alike
 from solver.solve.kinematics import Points, Pose, blended_turn, forward, place_points
 from solver.solve.placement import Skin
 from solver.solve.problem import Problem
@@ -79,6 +80,10 @@ SEARCH = (
     Round(_PLACED, 1.2, 16),
 )
 """On few keyframes: poor starts are dropped early, more of them the clearer it is which are poor."""
+_TRIED, _NEAR_RIVAL = 3, 1.3
+_CATCH_UP = (SEARCH[2].phase, _PLACED, _PLACED)
+"""Answers left behind that are followed to see how far behind the best different one is, and how; one that turns out to
+be as near as this is refined like the others."""
 FINE = (
     Phase(0.015, 0.06, 4, reassign=True, free_placement=True),
     Phase(0.01, 0.04, 6, free_placement=True),
@@ -99,6 +104,7 @@ class Fit:
     trace : total energy after every step
     poses : after every step, of the keyframes that it was solved on then
     refined : True once it was solved on all keyframes
+    behind : times the best answer's energy, on few keyframes, once it was left behind; NaN where that is not known
     """
 
     start: Hypothesis
@@ -108,6 +114,7 @@ class Fit:
     trace: tuple[float, ...]
     poses: tuple[Pose, ...] = ()
     refined: bool = False
+    behind: float = float("nan")
 
 
 def start_state(
@@ -205,6 +212,33 @@ def reattach(body: Body, state: State) -> tuple[State, Surface]:
     return replace(state, placement=placement), surface
 
 
+def place_costs(problem: Problem, state: State, offset: float) -> tuple[Points, np.ndarray, np.ndarray]:
+    """What it costs to put each marker on each place of the skin, given the poses.
+
+    Parameters
+    ----------
+    offset : m, of a marker above the skin
+
+    Returns
+    -------
+    The V places, where they are (N, V, 3) m, and the squared distance of each marker from each, summed over the frames
+    that show it, (V, M) m^2
+    """
+    body, betas = problem.body, state.pose.betas
+    skin = Skin(body, betas)
+    index = np.intersect1d(body.lod_index, skin.index)
+    candidates = Points(
+        skin.surface[index] + offset * skin.normal(index) - body.shape_dirs[index] @ betas,
+        body.shape_dirs[index],
+        body.weights[index],
+    )
+    placed = place_points(candidates, forward(body, state.pose), betas)  # (N, V, 3)
+    flat = placed.transpose(1, 0, 2).reshape(len(index), -1)
+    square = np.einsum("nvk,nvk->vn", placed, placed) @ problem.present
+    product = flat @ problem.target.transpose(0, 2, 1).reshape(flat.shape[1], -1)
+    return candidates, placed, square - 2 * product + np.einsum("nmk,nmk->m", problem.target, problem.target)
+
+
 def reassign(problem: Problem, state: State, weights: Weights) -> tuple[State, Surface]:
     """Each marker moved to the place on the skin that its whole trajectory fits best, given the poses.
 
@@ -214,18 +248,9 @@ def reassign(problem: Problem, state: State, weights: Weights) -> tuple[State, S
     body, betas = problem.body, state.pose.betas
     skin = Skin(body, betas)
     index = np.intersect1d(body.lod_index, skin.index)
-    candidates = Points(
-        skin.surface[index] + weights.offset * skin.normal(index) - body.shape_dirs[index] @ betas,
-        body.shape_dirs[index],
-        body.weights[index],
-    )
+    candidates, placed, distance = place_costs(problem, state, weights.offset)
     links = forward(body, state.pose)
-    placed = place_points(candidates, links, betas)  # (N, V, 3)
     count = np.maximum(problem.present.sum(axis=0), 1)
-    flat = placed.transpose(1, 0, 2).reshape(len(index), -1)
-    square = np.einsum("nvk,nvk->vn", placed, placed) @ problem.present
-    product = flat @ problem.target.transpose(0, 2, 1).reshape(flat.shape[1], -1)
-    distance = square - 2 * product + np.einsum("nmk,nmk->m", problem.target, problem.target)
     best = distance.argmin(axis=0)
     chosen = candidates.take(best)
     # from the vertex to the mean place of the marker in that vertex's own moving frame
@@ -312,7 +337,46 @@ def relax(
     fine = spread(partial(_advance, whole, phases=FINE[1:], base=base, judge=judge), fine)
     fine.sort(key=lambda fit: fit.energies.total)
     say(fine)
+    if all(same_stand(fine[0], fit) for fit in fine):
+        coarse = next(fit for fit in chosen if fit.start is fine[0].start)
+        left = _with_rival(problem, coarse, fine[0], left, base)
+        if left and left[0].behind < _NEAR_RIVAL:
+            rival = _advance(whole, closer_look(left[0]), phases=FINE[1:], base=base, judge=judge)
+            fine = _basins([*fine, replace(rival, behind=float("nan"))])
+            left = left[1:]
+            say(fine)
     return tuple(fine) + tuple(left[:_SHOWN])
+
+
+def same_stand(one: Fit, other: Fit) -> bool:
+    """Whether two fits are the same answer."""
+    bones, others = (fit.state.placement.weights.argmax(1) for fit in (one, other))
+    return alike(bones, others, one.state.camera.R_lab_cam, other.state.camera.R_lab_cam)
+
+
+def _with_rival(problem: Problem, coarse: Fit, best: Fit, left: list[Fit], base: Weights) -> list[Fit]:
+    """Those that were left behind, the best different answer among them first, with what it costs beside the best.
+
+    They were left early, when energies said little. So the rival descends as far as the best had on few keyframes.
+
+    Parameters
+    ----------
+    coarse : the best answer as it was then
+    """
+    judge = phase_weights(base, _PLACED)
+    tried = [fit for fit in left if not same_stand(best, fit)][:_TRIED]
+    for fit in tried:
+        rival = _advance(problem, fit, phases=_CATCH_UP, base=base, judge=judge)
+        if not same_stand(best, rival):
+            rival = replace(rival, behind=rival.energies.total / max(coarse.energies.total, 1e-9), poses=fit.poses)
+            return [rival, *(other for other in left if other is not fit)]
+    return left
+
+
+def settled_again(problem: Problem, fit: Fit, base: Weights) -> Fit:
+    """A refined fit whose markers choose their places anew, descended to its end once more."""
+    judge = _judging(phase_weights(base, FINE[-1]), problem)
+    return _advance(problem, fit, phases=FINE, base=base, judge=judge)
 
 
 def _tell(progress: Progress, guesses: Sequence[Hypothesis], fits: Sequence[Fit]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, replace
+from functools import partial
 
 import numpy as np
 
@@ -12,9 +13,12 @@ from solver.errors import InputError
 from solver.localize import Hypothesis, Search, hypotheses
 from solver.progress import Progress, silent
 from solver.rotations import log_so3
-from solver.solve.bundle import FINE, Fit, descend, relax
+from solver.solve.bundle import FINE, Fit, descend, relax, settled_again
 from solver.solve.converge import Settled
 from solver.solve.counting import candidate_number
+from solver.solve.doubts.clouds import clouds, one_body, taken_cloud
+from solver.solve.doubts.mirror import both_sides, in_mirror, video_in_doubt
+from solver.solve.doubts.still import still_markers
 from solver.solve.ending import motion_from
 from solver.solve.kinematics import Points, Pose, forward, place_points
 from solver.solve.placement import Skin
@@ -22,15 +26,25 @@ from solver.solve.problem import Problem
 from solver.solve.refine import every_frame
 from solver.solve.results import CameraResult, Candidate, FittedMotion, Localization, Orientation, Steps
 from solver.solve.settings import FitSettings, LocalizeSettings, OrientSettings
+from solver.solve.sifting import loose_share, strays, without_place
 from solver.solve.state import Camera, Observations, State, Surface, Weights
 from solver.solve.trust import believed, trusted
 
 _REACH_M = 2.0
 """No marker on a person is usually further from the middle of all markers."""
+_SIFTINGS = 2
+"""Times that markers which fit no place are left out; the first time, those of others still pull at the body."""
+_FEWEST = 3
+_CLEAR, _LOOSE_SHARE = 1.15, 0.1
+"""An answer that is less clear than this, or leaves more of the markers off their places, may have a wrong video."""
 
 
 def localize(
-    body: Body, seen: Observations, left_out: np.ndarray, settings: LocalizeSettings, camera: CameraResult | None = None
+    body: Body,
+    seen: Observations,
+    left_out: np.ndarray,
+    settings: LocalizeSettings,
+    camera: CameraResult | None = None,
 ) -> Localization:
     """Hypotheses of where the markers sit.
 
@@ -43,23 +57,23 @@ def localize(
     """
     present = np.isfinite(seen.markers).all(axis=2)
     often = (present.mean(axis=0) >= settings.seen_share) & (present.sum(axis=0) >= 3)
-    used = within_reach(seen.markers, np.flatnonzero(often & ~left_out))
+    wanted = np.flatnonzero(often & ~left_out)
+    standing = wanted[still_markers(seen.markers[:, wanted])] if settings.leave_out_still else wanted[:0]
+    wanted = np.setdiff1d(wanted, standing)
+    cloud = np.full(seen.markers.shape[1], -1)
+    cloud[wanted] = clouds(seen.markers[:, wanted])
+    overlay = partial(_laid_over, body, seen, settings=settings, camera=camera)
+    taken = 0
+    if cloud.max(initial=0) > 0:
+        cloud = one_body(cloud, lambda own: overlay(own)[0][0].cost)
+        taken = taken_cloud(cloud, settings.part_of_cloud, lambda own: overlay(own)[0][0].cost)
+    used = within_reach(seen.markers, wanted[(cloud[wanted] == taken) | (cloud[wanted] < 0)])
     if len(used) < 3:
         raise InputError(
             f"only {len(used)} markers are seen in enough frames", "the markers", "record or keep at least 3 markers"
         )
-    few = keyframes(seen, used, settings.few)
+    found, few = overlay(used)
     many = np.union1d(few, keyframes(seen, used, settings.many))
-    betas = np.zeros(body.shape_count)
-    vertices = np.intersect1d(body.lod_index, np.flatnonzero(body.marker_mask))[::3]
-    placement, _ = Skin(body, betas).on_vertices(vertices, Weights().offset)
-    still = Pose(seen.prior[few], np.repeat(-body.joint_template[:1], len(few), axis=0), betas)
-    points = place_points(placement, forward(body, still), betas)
-    bone = body.weights[vertices].argmax(axis=1)
-    search = Search(yaws=settings.yaws, keep=settings.keep, any_orientation=settings.any_orientation)
-    found = hypotheses(
-        seen.markers[few][:, used], points, vertices, bone, search, None if camera is None else camera.R_lab_cam
-    )
     vertex = np.stack([h.vertex for h in found])
     return Localization(
         markers=used,
@@ -72,7 +86,26 @@ def localize(
         cost_mm=np.sqrt([h.cost for h in found]) * 1000,
         start=tuple(h.start for h in found),
         yaw_deg=np.array([h.yaw_deg for h in found]),
+        still=standing,
+        cloud=cloud,
+        taken=taken,
     )
+
+
+def _laid_over(
+    body: Body, seen: Observations, used: np.ndarray, settings: LocalizeSettings, camera: CameraResult | None
+) -> tuple[tuple[Hypothesis, ...], np.ndarray]:
+    """The ways to lay the video's body over some columns of the markers, the nearest first, and the few keyframes."""
+    few = keyframes(seen, used, settings.few)
+    betas = np.zeros(body.shape_count)
+    vertices = np.intersect1d(body.lod_index, np.flatnonzero(body.marker_mask))[::3]
+    placement, _ = Skin(body, betas).on_vertices(vertices, Weights().offset)
+    still = Pose(seen.prior[few], np.repeat(-body.joint_template[:1], len(few), axis=0), betas)
+    points = place_points(placement, forward(body, still), betas)
+    bone = body.weights[vertices].argmax(axis=1)
+    search = Search(yaws=settings.yaws, keep=settings.keep, any_orientation=settings.any_orientation)
+    turn = None if camera is None else camera.R_lab_cam
+    return hypotheses(seen.markers[few][:, used], points, vertices, bone, search, turn), few
 
 
 def within_reach(markers: np.ndarray, used: np.ndarray) -> np.ndarray:
@@ -112,8 +145,15 @@ def orient(
     settings: OrientSettings,
     camera: CameraResult | None = None,
     progress: Progress = silent,
+    *,
+    try_mirror: bool = True,
 ) -> Orientation:
-    """Every hypothesis relaxed, the best refined, all ranked."""
+    """Every hypothesis relaxed, the best refined, all ranked; markers that fit no place left out.
+
+    Parameters
+    ----------
+    try_mirror : where the answer contradicts the video, see what its mirror image costs
+    """
     from solver.solve.confidence import judge
 
     used = replace(seen, markers=seen.markers[:, found.markers])
@@ -128,24 +168,58 @@ def orient(
     if camera is not None:
         known = _camera_of(camera, used.lab_centre)
         weights = replace(weights, free_camera=False)
-    fits = relax(
+    search = partial(
+        relax,
         body,
-        used,
-        landmarks,
-        guesses,
-        found.few,
-        found.many,
-        weights,
+        landmarks=landmarks,
+        guesses=guesses,
+        few=found.few,
+        many=found.many,
+        base=weights,
         keep=settings.refine,
         camera=known,
         progress=progress,
     )
+    fits = search(used)
+    far = np.zeros(len(found.markers), dtype=bool)
+    for _ in range(_SIFTINGS if settings.leave_out_far else 0):
+        whole = Problem(body, used.at(found.many), landmarks)
+        stray = strays(body, fits[0], used.at(found.many).markers)
+        if not stray.any():
+            break
+        nowhere = stray & without_place(whole, fits[0], weights.offset)
+        if not nowhere.any() or (far | nowhere).sum() > len(far) - _FEWEST:
+            fits = (settled_again(whole, fits[0], weights), *fits[1:])
+            break
+        far |= nowhere
+        used = replace(used, markers=np.where(far[:, None], np.nan, used.markers))
+        fits = search(used)
     index = {id(guess): i for i, guess in enumerate(guesses)}
     whole = Problem(body, used.at(found.many), landmarks)
     candidates = tuple(
         _candidate(body, fit, index[id(fit.start)], whole, _steps(fit.poses, found.few, found.many)) for fit in fits
     )
-    return judge(candidates)
+    ranked = replace(judge(candidates, ~far), far=found.markers[far])
+    best = candidates[0]
+    if try_mirror and camera is None and best.refined:
+        joint = np.where(far, -1, best.bone)
+        loose = loose_share(body, fits[0], used.at(found.many).markers) > _LOOSE_SHARE
+        doubtful = both_sides(joint) and (ranked.margin < _CLEAR or far.any() or loose)
+        if doubtful or video_in_doubt(best.rotations, used.at(found.many), joint, best.camera.reprojection_px):
+            ranked = replace(ranked, mirror=best.energy / _mirrored_energy(body, used, landmarks, found, settings))
+    return ranked
+
+
+def _mirrored_energy(
+    body: Body, used: Observations, landmarks: Points, found: Localization, settings: OrientSettings
+) -> float:
+    """What the best answer costs with the video's mirror image."""
+    seen = in_mirror(used)
+    few, many = len(found.few), len(found.many)
+    own = LocalizeSettings(few=few, many=many, leave_out_still=False, part_of_cloud=1)
+    again = localize(body, seen, ~np.isfinite(seen.markers).all(axis=2).any(axis=0), own)
+    ranked = orient(body, seen, landmarks, again, replace(settings, leave_out_far=False), try_mirror=False)
+    return ranked.candidates[0].energy
 
 
 def fit(
@@ -161,11 +235,17 @@ def fit(
     """The chosen answer carried to every frame."""
     row = chosen_row(ranked, settings)
     chosen = ranked.candidates[row]
-    used = replace(seen, markers=seen.markers[:, found.markers])
+    used = in_use(seen, found, ranked)
     frames = found.many if chosen.refined else found.few
     state, surface, weights = _settled(body, used.at(frames), landmarks, chosen, settings)
     pose = every_frame(body, used, landmarks, frames, state, surface, weights, progress)
     return fitted_motion(body, seen, found, ranked, settings, state, pose, time)
+
+
+def in_use(seen: Observations, found: Localization, ranked: Orientation) -> Observations:
+    """What is seen of the markers in use (U); those that belong to nobody count as lost."""
+    nobody = np.isin(found.markers, ranked.far)
+    return replace(seen, markers=np.where(nobody[:, None], np.nan, seen.markers[:, found.markers]))
 
 
 def chosen_row(ranked: Orientation, settings: FitSettings) -> int:
@@ -205,14 +285,16 @@ def fitted_motion(
     row = chosen_row(ranked, settings)
     camera = ranked.candidates[row].camera
     pinned = settings.candidate is not None
+    kept = ~np.isin(found.markers, ranked.far)
+    bone, vertex = _sites(body, state)
     return motion_from(
         body,
         seen.markers,
         time,
         pose,
-        found.markers,
-        state.placement,
-        _sites(body, state),
+        found.markers[kept],
+        state.placement.take(np.flatnonzero(kept)),
+        (bone[kept], vertex[kept]),
         camera=_written(state.camera, camera.image_size, camera.reprojection_px),
         chosen=row,
         confidence=1.0 if pinned else ranked.confidence,
@@ -306,6 +388,7 @@ def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem, steps: 
         trace=fitted.trace,
         bias=state.bias,
         steps=steps,
+        behind=fitted.behind,
     )
 
 

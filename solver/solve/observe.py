@@ -31,8 +31,7 @@ def observe(
     Observations of all T frames, and the (L) body points that the landmarks show
     """
     wanted = (markers.time - offset) / rate_ratio
-    rotations = slerp(prior.rotations, prior.time, wanted)
-    tracked = _covered(prior.time, prior.tracked, wanted)
+    rotations, tracked = on_clock(prior, markers.time, offset, rate_ratio)
     if landmarks is None:
         none = np.zeros((len(wanted), 0))
         points = Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
@@ -53,6 +52,12 @@ def _shape(prior: PosePrior, body: Body) -> np.ndarray | None:
     if prior.betas is None or not prior.kind or prior.kind != body.kind:
         return None
     return prior.betas[: body.betas_count]
+
+
+def on_clock(prior: PosePrior, time: np.ndarray, offset: float, rate_ratio: float) -> tuple[np.ndarray, np.ndarray]:
+    """The video's poses (T, 24, 3, 3) at times of the markers' clock, and where they were tracked (T,)."""
+    wanted = (time - offset) / rate_ratio
+    return slerp(prior.rotations, prior.time, wanted), _covered(prior.time, prior.tracked, wanted)
 
 
 def _covered(times: np.ndarray, tracked: np.ndarray, wanted: np.ndarray) -> np.ndarray:

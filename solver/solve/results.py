@@ -9,6 +9,10 @@ import numpy as np
 from solver.solve.state import no_bias
 
 
+def _no_markers() -> np.ndarray:
+    return np.zeros(0, dtype=int)
+
+
 @dataclass(frozen=True)
 class CameraResult:
     """A fitted pinhole camera, lab frame.
@@ -44,6 +48,9 @@ class Localization:
     cost_mm : (H,) root mean square distance of the markers to their vertices
     start : where each hypothesis was started: a bone, or "whole body"
     yaw_deg : (H,) the yaw it was started from
+    still : columns of markers that were left out because they stand while the others move
+    cloud : (M,) number of the cloud that each marker belongs to, 0 the largest; -1 for none
+    taken : number of the cloud that is solved; the markers of the others were left out
     """
 
     markers: np.ndarray
@@ -56,6 +63,9 @@ class Localization:
     cost_mm: np.ndarray
     start: tuple[str, ...]
     yaw_deg: np.ndarray
+    still: np.ndarray = field(default_factory=_no_markers)
+    cloud: np.ndarray = field(default_factory=_no_markers)
+    taken: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +106,7 @@ class Candidate:
     trace : total energy after each step
     bias : (K, 3, 3) what turns the video's joints towards the true ones, in every frame alike
     steps : the body after each of these, where it was kept
+    behind : times the energy that the best answer had when this one was left behind; NaN for refined ones
     """
 
     hypothesis: int
@@ -118,6 +129,7 @@ class Candidate:
     trace: tuple[float, ...]
     bias: np.ndarray = field(default_factory=no_bias)
     steps: Steps | None = None
+    behind: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -127,10 +139,14 @@ class Orientation:
     Attributes
     ----------
     candidates : refined ones first, least energy first
-    margin : energy of the best *different* answer over the best; 1 = they tie, infinite = there is no other
+    margin : energy of the best *different* answer over the best; 1 = they tie, infinite = there is no other. Where none
+        was refined: of the best of those left behind, on the few keyframes
     runner_up : its row in ``candidates``, -1 if there is none
     confidence : 0..1
     warnings : what is ambiguous, in words
+    far : columns of markers that fit no place on the body and were left out; in the candidates they have one still
+    mirror : times the energy that the best answer costs of what it does with the video mirrored; NaN where the video
+        gave no cause to try
     """
 
     candidates: tuple[Candidate, ...]
@@ -138,6 +154,8 @@ class Orientation:
     runner_up: int
     confidence: float
     warnings: tuple[str, ...]
+    far: np.ndarray = field(default_factory=_no_markers)
+    mirror: float = float("nan")
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,9 @@ class LocalizeSettings:
     keep : hypotheses handed on at most; those that are clearly worse than the best are not
     seen_share : share of the frames in which a marker must be seen to be used in the search
     any_orientation : also try lab frames that do not stand upright
+    leave_out_still : leave out markers that stand while the others move
+    part_of_cloud : which of several clouds of markers is solved, counted from 1, the largest first; None takes the one
+        that moves most like the video
     """
 
     yaws: int = 8
@@ -37,10 +40,14 @@ class LocalizeSettings:
     keep: int = 160
     seen_share: float = 0.05
     any_orientation: bool = False
+    leave_out_still: bool = True
+    part_of_cloud: int | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot work."""
         _positive(self, "yaws", "few", "many", "keep")
+        if self.part_of_cloud is not None:
+            _positive(self, "part_of_cloud")
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,7 @@ class OrientSettings:
     prior_deg : spread of the video's joint rotations
     bias_deg : spread of what a reconstruction that came without landmarks gets wrong alike in every frame
     focal_guess : focal length as a share of the image's longer side, where no camera is given
+    leave_out_far : leave out markers that fit no place on the body, and solve again without them
     """
 
     refine: int = 4
@@ -62,6 +70,7 @@ class OrientSettings:
     prior_deg: float = 18.0
     bias_deg: float = 15.0
     focal_guess: float = 0.85
+    leave_out_far: bool = True
 
     def __post_init__(self) -> None:
         """Refuse what cannot work."""

@@ -49,6 +49,13 @@ def landmark_points(body: Body) -> tuple[Points, np.ndarray]:
     return Points(rest[rows], dirs[rows], weights[rows]), np.array([LANDMARKS.index(name) for name in used])
 
 
+def mirror_landmarks() -> np.ndarray:
+    """(L,) the landmark on the other side of each that ``landmark_points`` names."""
+    used = [name for name in LANDMARKS if name not in _UNUSED]
+    swap = {"left": "right", "right": "left"}
+    return np.array([used.index("_".join(swap.get(word, word) for word in name.split("_"))) for name in used])
+
+
 def lift(landmarks: Landmarks, body: Body, progress: Progress = silent) -> PosePrior:
     """Joint rotations of the person in the video.
 

@@ -15,6 +15,8 @@ import pytest
 from solver.body.bones import with_bone_lengths
 from solver.body.model import EMBEDDED, Body
 from solver.errors import InputError
+from solver.io import load_markers
+from solver.io.export_c3d import write_c3d
 from solver.outputs import write_formats
 from solver.pipeline import solve_session
 from solver.pipeline.digest import file_digest
@@ -34,7 +36,7 @@ from tests.solve.conftest import simulate
 from tests.synthetic import Recording, record, session
 
 TINY = {"localize": {"yaws": 6, "few": 4, "many": 6, "keep": 3}, "orient": {"refine": 2}}
-FITTED = {"localize", "orient", "fit", "angles", "surface"}
+FITTED = {"localize", "orient", "fit", "angles", "surface", "check"}
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +90,7 @@ def edited(folder: Path, edits: Mapping[str, Mapping[str, Any]]) -> SolveRequest
         ("segment", "threshold", 0.01, {"segment"} | FITTED),
         ("localize", "keep", 5, FITTED),
         ("orient", "offset_mm", 12.0, FITTED - {"localize"}),
-        ("fit", "candidate", 1, {"fit", "angles", "surface"}),
+        ("fit", "candidate", 1, {"fit", "angles", "surface", "check"}),
         ("angles", "convention", "isb", {"angles"}),
     ],
 )
@@ -150,18 +152,43 @@ def test_a_result_that_is_gone_or_damaged_is_computed_again(mine: Path) -> None:
     assert computed(SolveRequest(mine)) == {"angles"}
     (arrays,) = (mine / "results" / "surface").glob("*/arrays.npz")
     arrays.write_bytes(arrays.read_bytes()[:-1])
-    assert computed(SolveRequest(mine)) == {"surface"}
+    assert computed(SolveRequest(mine)) == {"surface"}, "what was made of it is there"
 
 
 def test_a_pinned_candidate_is_used_and_can_be_let_go(mine: Path) -> None:
     first = content(mine)
     outcome = solve_session(edited(mine, {"fit": {"candidate": 1}}), silent)
-    assert set(outcome.summary["computed"]) == {"fit", "angles", "surface"}
+    assert set(outcome.summary["computed"]) == {"fit", "angles", "surface", "check"}
     assert any("pinned by hand" in warning for warning in outcome.warnings)
     assert json.loads((mine / "angles.json").read_text())["edits"] == {"fit": {"candidate": 1}}
     assert computed(SolveRequest(mine)) == set(), "the pin stays"
     assert computed(edited(mine, {})) == set(), "without it, the first answer is back"
     assert content(mine)["motion.npz"][1] == first["motion.npz"][1]
+
+
+def test_what_the_rules_find_is_in_every_output(made: Recording, tmp_path: Path) -> None:
+    """Two markers on a chair: left out, listed, said, and nobody's in the labelled file; the confidence is capped."""
+    markers = load_markers(made.markers)
+    chair = np.random.default_rng(0).normal([0.4, 0.3, 0.5], 0.0003, (len(markers.positions), 2, 3))
+    more = replace(
+        markers,
+        positions=np.concatenate([markers.positions, chair], axis=1),
+        labels=(*markers.labels, "seat", "back"),
+        filled=None,
+    )
+    write_c3d(tmp_path / "chair.c3d", more, up="z")
+    out = tmp_path / "out"
+    with_chair = replace(made, markers=tmp_path / "chair.c3d")
+    outcome = solve_session(session(out, with_chair, TINY, prior=made.prior, offset=made.offset), silent)
+    assert outcome.summary["nobodys_markers"] == ["seat", "back"]
+    (doubt,) = [one for one in outcome.summary["doubts"] if one["kind"] == "still markers"]
+    assert doubt["markers"] == ["seat", "back"] and doubt["value"] == 2
+    assert doubt["sentence"] in outcome.warnings and doubt["sentence"] in outcome.summary["warnings"]
+    assert outcome.summary["confidence"] <= 0.6
+    assert "seat, back" in (out / "report.html").read_text(encoding="utf-8")
+    named = load_markers(out / "markers_labelled.c3d").labels
+    assert {"unassigned_seat", "unassigned_back"} <= set(named)
+    json.dumps(outcome.summary)
 
 
 def test_a_marker_left_out_is_not_used(mine: Path) -> None:

@@ -77,7 +77,10 @@ def test_movement_is_judged_where_the_markers_are() -> None:
     leg = np.array([INDEX["left_hip"], INDEX["left_knee"]])
     assert stillness(turning("right_elbow", 90), leg), "the arm says nothing of a leg"
     assert not stillness(turning("left_knee", 60), leg)
-    assert stillness(turning("left_knee", 60), leg[:1]), "one bone alone has no joint to tell it by"
+    assert not stillness(turning("left_knee", 60), leg[:1]), "one bone alone says it by a rule of its own"
+    knee_alone = np.array([INDEX[name] for name in ("left_hip", "left_knee", "left_ankle", "left_foot")])
+    assert not stillness(turning("left_knee", 108), knee_alone), "of a leg one joint that bends is enough"
+    assert stillness(turning("left_knee", 108), np.arange(22)), "of a whole body it is not"
     # 5th to 95th percentile of an even sweep
     assert movement_deg(turning("left_knee", 60), [INDEX["left_knee"]]) == pytest.approx(54, abs=0.5)
 

@@ -187,6 +187,19 @@ def test_a_candidate_is_pinned_and_let_go(actions: Actions, solved: Workbench) -
     assert actions.why_not("candidate.unpin") == "no candidate is pinned"
 
 
+def test_another_cloud_of_markers_is_chosen_and_undone(actions: Actions, asks: Answers, solved: Workbench) -> None:
+    assert actions.why_not("cloud.choose") == "the markers form one cloud"
+    found = solved.board.current["localize"]
+    found.cloud[:3] = 1
+    asks.answers["Solve the markers of"] = 1
+    assert actions.trigger("cloud.choose")
+    assert solved.board.settings["localize"].part_of_cloud == 2
+    assert solved.board.state("localize") == "stale"
+    assert actions.trigger("edit.undo")
+    assert solved.board.settings["localize"].part_of_cloud is None
+    assert solved.board.state("localize") == "cached"
+
+
 def test_range_and_offset(actions: Actions, solved: Workbench) -> None:
     assert actions.trigger("offset.found")
     assert solved.board.settings["sync"].offset is None

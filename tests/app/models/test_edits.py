@@ -52,6 +52,14 @@ def test_offset_and_pin_leave_no_trace_when_taken_back() -> None:
     assert edits.unpin_candidate(edits.pin_candidate(EMPTY, 1).session).session == EMPTY
 
 
+def test_a_cloud_is_chosen_for_this_recording_and_can_be_taken_back() -> None:
+    edit = edits.choose_cloud(EMPTY, 2)
+    assert edit.sentence == "Solve cloud 2 of the markers"
+    assert edit.session.edits == {"localize": {"part_of_cloud": 2}} and not edit.session.settings
+    assert stage(edit.session, "localize").part_of_cloud == 2
+    assert edits.take_back(edit.session, "localize").session == EMPTY
+
+
 def test_sentences_count_from_one_and_name_units() -> None:
     assert edits.pin_candidate(EMPTY, 1).sentence == "Candidate 2 pinned"
     assert edits.set_offset(EMPTY, 0.37).sentence == "Offset of the video +0.370 s"

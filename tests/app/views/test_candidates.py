@@ -15,6 +15,8 @@ from app.views.convergence import of_orientation, of_paper
 from app.views.hypotheses import hypotheses_picture
 from solver.body.model import Body
 from solver.body.skeleton import INDEX, subtrees
+from solver.solve.doubts.doubt import Doubt
+from solver.solve.doubts.rules import Verdict
 from solver.solve.paper.results import PaperLocalization
 from solver.solve.results import Localization, Orientation
 
@@ -182,6 +184,12 @@ def test_the_runner_up_is_named(results: Mapping[str, Any]) -> None:
     assert shown.cards[1].same_as_first, "same bones, same heading"
     alone = hypotheses_picture(replace(ranked, candidates=(one,), runner_up=-1, margin=float("inf")))
     assert alone.sentence.startswith("No different answer")
+
+
+def test_doubts_and_the_confidence_that_they_leave_are_said(results: Mapping[str, Any]) -> None:
+    doubt = Doubt("turning camera", "The camera turns: stand it still.")
+    shown = hypotheses_picture(results["orient"], verdict=Verdict(0.42, (doubt,), (), ()))
+    assert "confidence 42 %" in shown.sentence and shown.sentence.endswith(doubt.sentence)
 
 
 def test_the_papers_cards_show_the_terms_of_stage_four(paper_results: Mapping[str, Any]) -> None:

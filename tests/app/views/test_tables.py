@@ -19,6 +19,7 @@ from app.views.tracks import MEASURED, tracks_of
 from solver.angles import AngleSettings, Convention, JointAngles, conventions, evidence, joint_angles
 from solver.body.skeleton import JOINTS
 from solver.segment import segment
+from solver.solve.doubts.rules import Verdict
 from tests.app.views.conftest import Made
 
 
@@ -53,6 +54,18 @@ def test_a_row_says_what_is_known_of_its_marker(made: Made) -> None:
             assert np.isnan([table.mean[m], table.p95[m], table.worst[m], table.worst_time[m]]).all()
     longest = max(len(list(g)) for lost, g in groupby(~made.markers.present[:, 3]) if lost)
     assert np.isclose(table.longest_gap[3], longest / 50.0)
+
+
+def test_markers_that_the_rules_doubt_are_marked(made: Made) -> None:
+    verdict = Verdict(0.6, (), nobody=(12,), suspect=(3,))
+    tracks = tracks_of(made.markers, made.motion)
+    plain, marked = (marker_table(tracks, None, made.motion, found).bone for found in (None, verdict))
+    assert marked[3] == f"{plain[3]} (doubtful)" and marked[12] == "nobody's"
+    assert [name for m, name in enumerate(marked) if m not in (3, 12)] == [
+        name for m, name in enumerate(plain) if m not in (3, 12)
+    ]
+    of_others = replace(verdict, suspect=(99,))
+    assert marker_table(tracks, None, made.motion, of_others).bone == plain, "of a file with other markers"
 
 
 def test_before_any_result_the_table_tells_of_presence_alone(made: Made) -> None:
