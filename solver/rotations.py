@@ -80,3 +80,10 @@ def slerp(rotations: np.ndarray, times: np.ndarray, wanted: np.ndarray) -> np.nd
     share = np.clip((wanted - times[left]) / (times[right] - times[left]), 0, 1)
     step = log_so3(np.swapaxes(rotations[left], -1, -2) @ rotations[right])
     return rotations[left] @ exp_so3(step * share[:, None, None])
+
+
+def mean_rotation(rotations: np.ndarray) -> np.ndarray:
+    """(3, 3) the rotation with the least mean squared (chordal) distance to (N, 3, 3) rotations."""
+    u, _, vt = np.linalg.svd(rotations.mean(axis=0))
+    u[:, -1] *= np.sign(np.linalg.det(u @ vt))
+    return np.asarray(u @ vt)

@@ -111,12 +111,14 @@ def export_angles(board: StageBoard, path: Path) -> tuple[Path, ...]:
     folder = make_folder(path.parent)
     try:
         with tempfile.TemporaryDirectory(prefix=".tmp-", dir=folder) as staging:
-            table, about = export(board, Path(staging), ["angles"])
-            os.replace(about, path.with_suffix(".json"))
-            os.replace(table, path)
+            written = export(board, Path(staging), ["angles"])
+            # The table last: where it is, all that explains it is there too.
+            targets = {file: path.with_name(path.stem + file.name.removeprefix("angles")) for file in written[::-1]}
+            for file, target in targets.items():
+                os.replace(file, target)
     except OSError as error:
         raise cannot_write(path, error) from error
-    return path, path.with_suffix(".json")
+    return tuple(sorted(targets.values()))
 
 
 def graph_run(board: StageBoard) -> GraphRun:

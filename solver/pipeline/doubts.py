@@ -13,7 +13,7 @@ _BAD_FIT_M = 0.03
 
 def assumptions(graph: GraphRun) -> tuple[str, ...]:
     """What was assumed while the files were read."""
-    return (*graph["markers"].notes, *notes_of(graph["clean"]), *graph["prior"].notes)
+    return (*graph["markers"].notes, *notes_of(graph["clean"]), *graph["prior"].notes, *graph["neutral"].notes)
 
 
 def doubts(graph: GraphRun) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ import numpy as np
 from solver.angles import AngleSettings, JointAngles
 from solver.clean.clean import Cleaned
 from solver.markers import Markers
+from solver.neutral import Neutral, NeutralSettings
 from solver.pipeline import cleaning, fitting, inputs
 from solver.pipeline.cleaning import CleaningSettings
 from solver.pipeline.inputs import LandmarkSettings, MarkerSettings, PriorSettings, SyncSettings
@@ -19,7 +20,7 @@ from solver.surface import SurfaceDistance
 from solver.sync import Sync
 from solver.video.landmarks import Landmarks
 
-SOURCES = ("marker_file", "video_file", "prior_file", "camera_file", "body_file", "weights_file")
+SOURCES = ("marker_file", "video_file", "prior_file", "camera_file", "body_file", "weights_file", "neutral_file")
 """The files a session is made from, by the names ``session.toml`` has for them."""
 
 
@@ -66,6 +67,16 @@ def said_fit(motion: FittedMotion) -> str:
 
 def _said_surface(found: SurfaceDistance) -> str:
     return f"markers {1000 * found.mean:.1f} mm from the skin (m2s)"
+
+
+def said_neutral(neutral: Neutral) -> str:
+    """What angles are counted from."""
+    if neutral.zero == "recorded":
+        return "none: angles are counted from the convention's zero"
+    count, expected = neutral.matched
+    if not expected:
+        return neutral.where
+    return f"{neutral.where}, {count} of {expected} markers, {1000 * neutral.residual:.1f} mm from their places"
 
 
 def _said_angles(angles: JointAngles) -> str:
@@ -123,7 +134,26 @@ GRAPH = (
         said_fit,
         cost=2,
     ),
-    Stage("angles", 2, AngleSettings, ("fit", "body_file"), fitting.read_angles, JointAngles, _said_angles, cost=0.1),
+    Stage(
+        "neutral",
+        1,
+        NeutralSettings,
+        ("fit", "neutral_file", "body_file"),
+        fitting.find_neutral,
+        Neutral,
+        said_neutral,
+        cost=0.2,
+    ),
+    Stage(
+        "angles",
+        3,
+        AngleSettings,
+        ("fit", "neutral", "body_file"),
+        fitting.read_angles,
+        JointAngles,
+        _said_angles,
+        cost=0.1,
+    ),
     Stage(
         "surface",
         1,
