@@ -14,15 +14,13 @@ import numpy as np
 from solver.body.model import Body
 from solver.errors import InputError
 from solver.markers import Markers
-from solver.rotations import exp_so3, log_so3, mean_rotation
+from solver.rotations import exp_so3, mean_rotation
 from solver.solve.results import FittedMotion
 
 Zero = Literal["recorded", "neutral"]
 
-_MOVES_DEG = 5.0
-"""Standard deviation of a joint over the neutral span beyond which the person does not stand still."""
-_STILL_M = 0.01
-"""The same of markers in a static trial (median over the markers); swaying while standing is some millimetres."""
+_STILL_M = 0.02
+"""How far markers may stray from their mean (nine in ten of them): swaying while standing is some millimetres."""
 _LEAST_S = 0.1
 _USUAL_S = 1.0
 _FITS_M = 0.015
@@ -95,14 +93,12 @@ def neutral_span(motion: FittedMotion, settings: NeutralSettings) -> Neutral:
         raise InputError(f"{where} is too short", "the neutral pose", f"give at least {_LEAST_S:g} s")
     rotations = motion.rotations[inside]
     pose = np.stack([mean_rotation(rotations[:, j]) for j in range(rotations.shape[1])])
-    off = np.degrees(np.linalg.norm(log_so3(np.swapaxes(pose, -1, -2) @ rotations), axis=-1))
-    held = np.unique(motion.marker_joint[motion.marker_joint >= 0])
-    moves = float(np.sqrt((off[:, held] ** 2).mean(axis=0)).max(initial=0.0))
-    if moves > _MOVES_DEG:
+    moved = _moved(motion.placed[inside][:, motion.marker_joint >= 0])
+    if not moved <= _STILL_M:
         raise InputError(
-            f"the person moves in {where} (joints turn by {moves:.0f} degrees about their mean)",
+            f"the person moves in {where} (markers by {1000 * moved:.0f} mm)",
             "the neutral pose",
-            f"choose a span in which they stand still to {_MOVES_DEG:g} degrees",
+            f"choose a span in which markers stay within {1000 * _STILL_M:.0f} mm",
         )
     return Neutral("neutral", pose, where)
 
@@ -176,8 +172,8 @@ def _stillest(markers: Markers, settings: NeutralSettings) -> Markers:
         count = min(len(markers.positions), max(2, round(_USUAL_S * markers.rate)))
         firsts = np.unique(np.linspace(0, len(markers.positions) - count, 40).astype(int))
         spans = [markers.select(slice(int(first), int(first) + count)) for first in firsts]
-        chosen = min(spans, key=_moved)
-    moved = _moved(chosen)
+        chosen = min(spans, key=lambda span: _moved(span.positions))
+    moved = _moved(chosen.positions)
     if not moved <= _STILL_M:
         what = "no marker is seen throughout" if not np.isfinite(moved) else f"markers move by {1000 * moved:.0f} mm"
         raise InputError(
@@ -188,11 +184,10 @@ def _stillest(markers: Markers, settings: NeutralSettings) -> Markers:
     return chosen
 
 
-def _moved(markers: Markers) -> float:
-    """m, median over the markers of how far each strays from its mean; infinite if none is seen half of the time."""
-    seen = markers.present.mean(axis=0) >= 0.5
+def _moved(positions: np.ndarray) -> float:
+    """m, how far nine in ten of the markers (T, M, 3) stay from their mean; infinite if none is seen half the time."""
+    seen = np.isfinite(positions).all(axis=2).mean(axis=0) >= 0.5
     if not seen.any():
         return float("inf")
-    positions = markers.positions[:, seen]
-    off = positions - np.nanmean(positions, axis=0)
-    return float(np.median(np.sqrt(np.nanmean((off**2).sum(axis=2), axis=0))))
+    off = positions[:, seen] - np.nanmean(positions[:, seen], axis=0)
+    return float(np.percentile(np.sqrt(np.nanmean((off**2).sum(axis=2), axis=0)), 90))
