@@ -32,7 +32,7 @@ from app.cli_synth import synth_options
 from app.cli_train import train_options
 from solver import __version__
 from solver.bench.request import OUT, names
-from solver.pipeline.request import Convention, Method, Units, Up, parse_range
+from solver.pipeline.request import Convention, Method, Units, Up, parse_neutral, parse_range
 from solver.plain import shown
 
 COMMANDS = {
@@ -169,6 +169,12 @@ def _solve_options(solve: argparse.ArgumentParser) -> None:
     how.add_argument("--weights", type=Path, metavar="FILE", help="of the network, instead of those that ship (neural)")
     how.add_argument("--iterations", type=int, metavar="N", help="of each optimisation at most (method paper)")
     how.add_argument("--convention", choices=get_args(Convention), help="names and signs of the angles")
+    how.add_argument(
+        "--neutral",
+        type=parse_neutral,
+        metavar="A:B|FILE|recorded",
+        help="count angles from this pose: a span of the trial in seconds, or a static trial's file",
+    )
     how.add_argument("--seed", type=int, metavar="N", help="of every random choice (default: 0)")
 
 

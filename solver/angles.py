@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, Literal
 
@@ -79,6 +79,9 @@ class JointAngles:
     sequence : A, the intrinsic sequence, or the axes, that each angle is part of
     positive : A, what a positive value means
     zero_pose : what the angles are counted from
+    neutral : (A,) degrees that were taken off, the angles of the neutral pose; 0 where nothing was
+    zero : "recorded", or "neutral" where angles are relative to a neutral pose
+    neutral_pose : what the neutral pose was read off, in words
     """
 
     time: np.ndarray
@@ -90,6 +93,23 @@ class JointAngles:
     sequence: tuple[str, ...]
     positive: tuple[str, ...]
     zero_pose: str
+    neutral: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    zero: Literal["recorded", "neutral"] = "recorded"
+    neutral_pose: str = ""
+
+    @property
+    def as_recorded(self) -> JointAngles:
+        """The same angles as the convention counts them, whatever the neutral pose."""
+        if self.zero == "recorded":
+            return self
+        return replace(
+            self,
+            degrees=self.degrees + self.neutral,
+            zero_pose=conventions()[self.convention]["zero_pose"],
+            neutral=np.zeros(0),
+            zero="recorded",
+            neutral_pose="",
+        )
 
     @property
     def jumps(self) -> np.ndarray:
@@ -175,6 +195,32 @@ def read_angles(time: np.ndarray, segments: Mapping[str, np.ndarray], settings: 
     )
 
 
+def relative_to(angles: JointAngles, neutral: JointAngles, where: str, same_heading: bool) -> JointAngles:
+    """Angles less those of a neutral pose.
+
+    An angle that the sequence cannot tell in the neutral pose keeps the convention's zero, and so does the pelvis' turn
+    about the vertical where the neutral pose may face anywhere.
+
+    Parameters
+    ----------
+    neutral : of one frame, in the same convention
+    where : what the neutral pose was read off, in words
+    same_heading : whether the neutral pose's heading in the lab is one of the movement's
+    """
+    offset = np.where(neutral.singular[0], 0.0, neutral.degrees[0])
+    if not same_heading:
+        offset[[not column.near and column.axis == "Y" for column in _columns(angles.convention)]] = 0.0
+    said = f"The pose of {where}. Beneath it, the convention's own zero: {angles.zero_pose}"
+    return replace(
+        angles,
+        degrees=angles.degrees - offset,
+        zero_pose=said,
+        neutral=offset,
+        zero="neutral",
+        neutral_pose=where,
+    )
+
+
 def evidence(convention: str, marker_joint: np.ndarray) -> dict[str, str]:
     """What each angle of a convention rests on, by column name.
 
@@ -208,6 +254,11 @@ class _Column:
     sign: int
     positive: str
     ranges: np.ndarray
+
+    @property
+    def axis(self) -> str:
+        """The axis that the angle turns about, "" where it has one of its own."""
+        return self.sequence[self.place] if self.axes is None else ""
 
 
 def _columns(convention: str) -> Iterator[_Column]:

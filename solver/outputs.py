@@ -21,6 +21,7 @@ from solver.io.atomic import write_text_atomic
 from solver.io.c3d_keep import Original
 from solver.io.camera import FILE_NAME as CAMERA
 from solver.io.camera import write_camera
+from solver.io.export_angles import AS_RECORDED
 from solver.io.export_smpl import write_smpl_npz
 from solver.io.together import together
 from solver.markers import Markers
@@ -45,10 +46,10 @@ FILES = (
     "report.html",
 )
 """Written by every solve."""
-SOMETIMES = (CAMERA, "markers_labelled.filled.csv")
-"""Written where there was a video, and where gaps were filled."""
+SOMETIMES = (CAMERA, "markers_labelled.filled.csv", AS_RECORDED)
+"""Written where there was a video, where gaps were filled, and where angles are relative to a neutral pose."""
 FORMATS = {
-    "angles": ("angles.csv", "angles.json"),
+    "angles": ("angles.csv", "angles.json", AS_RECORDED),
     "angles_long": ("angles_long.csv", "angles.json"),
     "mot": ("angles.mot",),
     "c3d": ("markers_labelled.c3d",),
@@ -162,7 +163,9 @@ def _write(
     if "angles_long" in formats:
         write_text_atomic(folder / "angles_long.csv", angles_long_csv(angles))
     if "mot" in formats:
-        write_mot(folder / "angles.mot", angles.time, (angles.names, np.where(angles.singular, np.nan, angles.degrees)))
+        # A model is posed by coordinates as its convention counts them, whatever the neutral pose.
+        told = angles.as_recorded
+        write_mot(folder / "angles.mot", told.time, (told.names, np.where(told.singular, np.nan, told.degrees)))
     if "motion" in formats:
         write_motion(folder / "motion.npz", markers, motion, body.betas_count)
     if "camera" in formats and motion.camera.image_size != (0, 0):

@@ -39,6 +39,7 @@ _ROLES = {
     "prior_file": "pose prior",
     "camera_file": "camera",
     "body_file": "body",
+    "neutral_file": "neutral pose",
 }
 _LIBRARIES = ("numpy", "scipy", "open3d-cpu", "open3d", "ai-edge-litert", "av")
 

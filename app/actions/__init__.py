@@ -5,12 +5,21 @@ from __future__ import annotations
 from app.actions.action import MENUS, Action, Actions, Asks
 from app.actions.clean_actions import CLEAN_ACTIONS
 from app.actions.edit_actions import EDIT_ACTIONS
+from app.actions.neutral_actions import NEUTRAL_ACTIONS
 from app.actions.play_actions import PLAY_ACTIONS
 from app.actions.run_actions import RUN_ACTIONS
 from app.actions.session_actions import SESSION_ACTIONS
 from app.actions.view_actions import VIEW_ACTIONS
 
-ACTIONS = (*SESSION_ACTIONS, *EDIT_ACTIONS, *CLEAN_ACTIONS, *VIEW_ACTIONS, *PLAY_ACTIONS, *RUN_ACTIONS)
+ACTIONS = (
+    *SESSION_ACTIONS,
+    *EDIT_ACTIONS,
+    *CLEAN_ACTIONS,
+    *NEUTRAL_ACTIONS,
+    *VIEW_ACTIONS,
+    *PLAY_ACTIONS,
+    *RUN_ACTIONS,
+)
 """Every action, in the order of the menus."""
 
 __all__ = ["ACTIONS", "MENUS", "Action", "Actions", "Asks"]

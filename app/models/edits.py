@@ -27,6 +27,7 @@ DECISIONS = {
     "segment": ("threshold", "groups", "merges", "splits", "moves", "left_out"),
     "localize": ("part_of_cloud",),
     "fit": ("candidate",),
+    "neutral": ("start", "stop"),
 }
 """Settings that are decided for one recording."""
 Layer = Literal["settings", "edits"]
@@ -37,6 +38,7 @@ INPUTS = {
     "camera_file": "camera",
     "body_file": "body",
     "weights_file": "network's weights",
+    "neutral_file": "static trial for the neutral pose",
 }
 
 
@@ -100,6 +102,21 @@ def set_range(session: Session, start: float | None, stop: float | None) -> Edit
     ends = (f"{end:.2f} s" if end is not None else word for end, word in ((start, "the start"), (stop, "the end")))
     whole = start is None and stop is None
     return Edit("Solve the whole recording" if whole else "Solve from {} to {}".format(*ends), after, "range")
+
+
+def set_neutral_span(session: Session, start: float, stop: float) -> Edit:
+    """Count angles from the mean pose of a span of the trial, s of the marker file's clock."""
+    inputs = {name: file for name, file in session.inputs.items() if name != "neutral_file"}
+    after = decide(replace(session, inputs=inputs), "neutral", {"start": float(start), "stop": float(stop)})
+    return Edit(f"Angles counted from the pose at {start:.2f} to {stop:.2f} s", after, "neutral")
+
+
+def no_neutral(session: Session) -> Edit:
+    """Count angles from the convention's own zero again."""
+    inputs = {name: file for name, file in session.inputs.items() if name != "neutral_file"}
+    after = _drop(replace(session, inputs=inputs), "edits", "neutral", {"start", "stop"})
+    after = _drop(after, "settings", "neutral", {"start", "stop"})
+    return Edit("Angles counted from the convention's own zero", after)
 
 
 def set_offset(session: Session, offset: float) -> Edit:

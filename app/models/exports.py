@@ -111,10 +111,11 @@ def export_angles(board: StageBoard, path: Path) -> tuple[Path, ...]:
     if path.suffix.lower() != ".csv":
         raise InputError("is no name for a table", path, "choose one that ends in .csv")
     with together(path.parent) as place:
-        table, about = export(board, place, ["angles"])
-        about.rename(place / path.with_suffix(".json").name)
-        table.rename(place / path.name)
-    return path, path.with_suffix(".json")
+        written = export(board, place, ["angles"])
+        named = {file: file.with_name(path.stem + file.name.removeprefix("angles")) for file in written}
+        for file, target in named.items():
+            file.rename(target)
+    return tuple(path.with_name(target.name) for target in named.values())
 
 
 def graph_run(board: StageBoard) -> GraphRun:

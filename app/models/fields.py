@@ -28,6 +28,7 @@ TITLES = {
     "orient": "Orientation",
     "network": "Network",
     "fit": "Fit",
+    "neutral": "Neutral pose",
     "angles": "Joint angles",
     "surface": "Distance to the skin",
     "check": "Doubts",

@@ -23,6 +23,8 @@ RANGES: dict[tuple[str, str], tuple[float, float]] = {
     ("segment", "far_penalty"): (0, 1),
     ("segment", "max_frames"): (2, 1_000_000),
     ("segment", "min_overlap"): (1, 10_000),
+    ("neutral", "start"): (-1e5, 1e5),
+    ("neutral", "stop"): (-1e5, 1e5),
     ("localize", "yaws"): (1, 72),
     ("localize", "few"): (2, 200),
     ("localize", "many"): (2, 1000),

@@ -11,6 +11,7 @@ from app.views.posing import Detail, Pose, PosedPoints, fixed_points, mesh_of, p
 from solver.body.model import Body
 from solver.localize import R_LAB_UPRIGHT_CAMERA
 from solver.markers import Markers
+from solver.neutral import Neutral, facing
 from solver.prior import PosePrior
 from solver.rotations import exp_so3, slerp
 from solver.solve.paper.results import PaperLocalization, Trace
@@ -138,6 +139,14 @@ def of_motion(body: Body, motion: FittedMotion) -> BodyTrack:
     """The body of a fit, at every frame."""
     used = np.flatnonzero(motion.marker_vertex >= 0)
     return BodyTrack(body, motion.betas, motion.time, motion.rotations, motion.trans, used, motion.marker_vertex[used])
+
+
+def of_neutral(body: Body, motion: FittedMotion, neutral: Neutral) -> BodyTrack:
+    """The neutral pose, in the middle of where the fitted body goes, and facing as it does on the whole."""
+    pose = np.broadcast_to(facing(neutral, motion), (2, *motion.rotations.shape[1:]))
+    middle = motion.trans[[0, -1]].mean(axis=0)
+    nothing = np.zeros(0, dtype=np.intp)
+    return BodyTrack(body, motion.betas, motion.time[[0, -1]], pose, np.stack([middle, middle]), nothing, nothing)
 
 
 def of_candidate(

@@ -20,6 +20,7 @@ _FILES = {
     "video": ("Add video", "Videos (*.mp4 *.mov *.avi *.mkv *.m4v *.webm);;All files (*)"),
     "prior": ("Add pose prior", "Poses (*.npz *.pkl *.pth *.pt *.json);;All files (*)"),
     "camera": ("Add camera", "Camera (camera.json *.json);;All files (*)"),
+    "neutral": ("Static trial for the neutral pose", "Markers (*.c3d *.trc *.csv *.tsv);;All files (*)"),
     "body": ("Use another body", "SMPL-layout models (*.npz *.pkl);;All files (*)"),
 }
 

@@ -20,6 +20,8 @@ from solver.solve.counting import candidate_number
 from solver.solve.results import Localization
 from widgets import palette
 
+NEUTRAL_COLOUR: RGB = (120, 130, 140)
+
 
 @dataclass(frozen=True)
 class Ghost:
@@ -66,12 +68,14 @@ class Ghosts:
 
     def _selected(self, what: object) -> None:
         names = set(what) if isinstance(what, frozenset | set | tuple | list) else set()
-        if names & {"candidate", "hypothesis"} or ("iteration" in names and self.bench.selection.iteration is None):
+        if names == {"stage"}:
+            self._make()
+        elif names & {"candidate", "hypothesis"} or ("iteration" in names and self.bench.selection.iteration is None):
             self._iteration = None
             self._make()
 
     def _results(self, stages: frozenset[str]) -> None:
-        if stages & {"localize", "orient", "solve", "clean", "markers", "compared", "fit", "prior", "sync"}:
+        if stages & {"localize", "orient", "solve", "clean", "markers", "compared", "fit", "prior", "sync", "neutral"}:
             if stages & {"localize", "orient", "solve"}:
                 self._iteration = None
             self._make()
@@ -79,8 +83,7 @@ class Ghosts:
     def _make(self) -> None:
         found = []
         own = self._of_iteration() if self._iteration is not None else self._of_selection()
-        if own is not None:
-            found.append(own)
+        found += [ghost for ghost in (own, self._of_neutral()) if ghost is not None]
         is_open = self.bench.document.is_open
         places = colour_places(self.bench.board) if is_open else {}
         for ref, motion in self.shown.compared("fit").items() if is_open else ():
@@ -98,6 +101,16 @@ class Ghosts:
         """What a fit that is compared is, in words."""
         row = next((row for row in self.bench.board.card("fit").earlier if row.key == key), None)
         return "Compared fit" if row is None else f"Fit: {row.settings or row.when}"
+
+    def _of_neutral(self) -> Ghost | None:
+        """The neutral pose, where the fit has the person, while its stage is selected."""
+        neutral, motion = self.shown.get("neutral"), self.shown.get("fit")
+        if self.bench.selection.stage != "neutral" or motion is None or neutral is None or neutral.zero == "recorded":
+            return None
+        track = self.shown.once(
+            "neutral", (neutral, motion), partial(bodies.of_neutral, self.shown.body, motion, neutral)
+        )
+        return Ghost("neutral", f"Neutral pose: {neutral.where}", track, NEUTRAL_COLOUR)
 
     def _of_iteration(self) -> Ghost | None:
         found, markers = self.shown.get("localize"), self.shown.markers

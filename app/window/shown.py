@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from solver.solve.results import FittedMotion
 
 WANTED = (
-    "markers", "clean", "landmarks", "prior", "sync", "segment", "localize", "solve", "orient", "fit", "angles",
-    "check",
+    "markers", "clean", "landmarks", "prior", "sync", "segment", "localize", "solve", "orient", "fit", "neutral",
+    "angles", "check",
 )  # fmt: skip
 
 

@@ -14,6 +14,9 @@ from solver.angles import JointAngles
 from solver.io.atomic import write_text_atomic
 from solver.plain import json_text
 
+AS_RECORDED = "angles_as_recorded.csv"
+"""The file beside ``angles.csv`` where that is relative to a neutral pose."""
+
 
 def write_angles(
     folder: str | Path,
@@ -23,17 +26,24 @@ def write_angles(
 ) -> None:
     """Write ``angles.csv`` (time in s, one column per angle in degrees, empty where singular) and ``angles.json``.
 
+    Where angles are relative to a neutral pose, ``angles_as_recorded.csv`` has them as the convention counts them.
+
     Parameters
     ----------
     provenance : program version, digests of the inputs, settings of every stage
     evidence : what each angle rests on, by column name, as ``solver.angles.evidence`` gives it
     """
     folder = Path(folder)
+    relative = angles.zero == "neutral"
     write_text_atomic(folder / "angles.csv", angles_csv(angles))
+    if relative:
+        write_text_atomic(folder / AS_RECORDED, angles_csv(angles.as_recorded))
     about = {
         "convention": angles.convention,
         "title": angles.title,
+        "zero": angles.zero,
         "zero_pose": angles.zero_pose,
+        **({"neutral_pose": angles.neutral_pose} if relative else {}),
         "units": {"time": "s", "angles": "degrees"},
         "angles": [
             {
@@ -42,10 +52,11 @@ def write_angles(
                 "positive": positive,
                 "singular_frames": int(flags.sum()),
                 "jumps_s": [round(float(t), 6) for t in angles.time[jumps]],
+                **({"neutral_degrees": round(float(angles.neutral[i]), 4)} if relative else {}),
                 **({} if evidence is None else {"evidence": evidence[name]}),
             }
-            for name, sequence, positive, flags, jumps in zip(
-                angles.names, angles.sequence, angles.positive, angles.singular.T, angles.jumps.T, strict=True
+            for i, (name, sequence, positive, flags, jumps) in enumerate(
+                zip(angles.names, angles.sequence, angles.positive, angles.singular.T, angles.jumps.T, strict=True)
             )
         ],
         **provenance,

@@ -10,7 +10,8 @@ from solver.solve.doubts.far import SUSPECT_M
 
 def assumptions(graph: GraphRun) -> tuple[str, ...]:
     """What was assumed while the files were read, and which markers deserve a look."""
-    return (*graph["markers"].notes, *notes_of(graph["clean"]), *graph["prior"].notes, *_suspects(graph))
+    read = (*graph["markers"].notes, *notes_of(graph["clean"]), *graph["prior"].notes, *graph["neutral"].notes)
+    return (*read, *_suspects(graph))
 
 
 def doubts(graph: GraphRun) -> tuple[str, ...]:

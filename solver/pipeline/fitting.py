@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.angles import AngleSettings, JointAngles
+from solver.neutral import Neutral, NeutralSettings
 from solver.pipeline.cleaning import measured
 from solver.pipeline.stage import NoSettings
 from solver.progress import Progress
@@ -83,14 +84,32 @@ def _body(given: Mapping[str, Any]) -> Body:
     return with_bone_lengths(Body.load(given["body_file"]))
 
 
-def read_angles(given: Mapping[str, Any], settings: AngleSettings, progress: Progress) -> JointAngles:
-    """Joint angles of the fitted body."""
-    from solver.angles import joint_angles
+def find_neutral(given: Mapping[str, Any], settings: NeutralSettings, progress: Progress) -> Neutral:
+    """The pose that angles are counted from, if the user named one."""
+    from solver.io import load_markers
+    from solver.neutral import neutral_file, neutral_span
 
-    body, motion = _body(given), given["fit"]
-    return joint_angles(
-        motion.time, motion.rotations, body.landmarks(motion.betas), body.joints(motion.betas), settings
-    )
+    path, motion = given["neutral_file"], given["fit"]
+    if path is not None:
+        markers = load_markers(path, up=settings.up, units=settings.units)
+        return neutral_file(_body(given), motion, markers, settings)
+    if settings.start is None and settings.stop is None:
+        return Neutral()
+    return neutral_span(motion, settings)
+
+
+def read_angles(given: Mapping[str, Any], settings: AngleSettings, progress: Progress) -> JointAngles:
+    """Joint angles of the fitted body, relative to the neutral pose where there is one."""
+    from solver.angles import joint_angles, relative_to
+    from solver.neutral import facing
+
+    body, motion, neutral = _body(given), given["fit"], given["neutral"]
+    shaped = body.landmarks(motion.betas), body.joints(motion.betas)
+    angles = joint_angles(motion.time, motion.rotations, *shaped, settings)
+    if neutral.zero == "recorded":
+        return angles
+    zero = joint_angles(motion.time[:1], facing(neutral, motion), *shaped, settings)
+    return relative_to(angles, zero, neutral.where, neutral.same_lab_heading)
 
 
 def measure_surface(given: Mapping[str, Any], settings: NoSettings, progress: Progress) -> SurfaceDistance:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import typing
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -14,6 +15,9 @@ from solver.errors import InputError
 Up = Literal["x", "y", "z"]
 Units = Literal["m", "cm", "mm"]
 Method = Literal["bundle", "paper", "neural"]
+RECORDED = "recorded"
+"""What ``--neutral`` takes for the convention's own zero."""
+_SPAN = re.compile(r"[-+.\deE]*:[-+.\deE]*")
 Convention = Literal["opensim", "isb", "gait2392", "visual3d", "plugin-gait"]
 
 
@@ -41,6 +45,8 @@ class SolveRequest:
     body : a user's own SMPL-layout model instead of the embedded body
     weights : of the network, instead of those that ship, for the method with a network
     convention : names and signs of the angles
+    neutral : what the angles are counted from: a span (start, stop) s of the trial, either may be None, the file of a
+        static trial of the same person, or "recorded" for the convention's own zero
     """
 
     markers: Path
@@ -62,6 +68,7 @@ class SolveRequest:
     body: Path | None = None
     weights: Path | None = None
     convention: Convention | None = None
+    neutral: tuple[float | None, float | None] | Path | Literal["recorded"] | None = None
 
     def __post_init__(self) -> None:
         """Refuse values that no data can make sense of."""
@@ -85,6 +92,8 @@ class SolveRequest:
             raise InputError(f"{self.seed} is not possible", option("seed"), "give 0 or a positive whole number")
         if self.range is not None:
             _check_range(*self.range)
+        if isinstance(self.neutral, tuple):
+            _check_range(*self.neutral, option("neutral"))
 
 
 @dataclass(frozen=True)
@@ -162,7 +171,14 @@ def option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def parse_range(text: str) -> tuple[float | None, float | None]:
+def parse_neutral(text: str) -> tuple[float | None, float | None] | Path | Literal["recorded"]:
+    """A span ``A:B`` in seconds, ``recorded``, or the name of a file."""
+    if text == RECORDED:
+        return "recorded"
+    return parse_range(text, option("neutral")) if _SPAN.fullmatch(text) and text != ":" else Path(text)
+
+
+def parse_range(text: str, where: str = "--range") -> tuple[float | None, float | None]:
     """``A:B`` in seconds, either end may be left out: ``2.5:10``, ``:10``, ``2.5:``."""
     start, colon, stop = text.partition(":")
     try:
@@ -170,14 +186,14 @@ def parse_range(text: str) -> tuple[float | None, float | None]:
             raise ValueError(text)
         ends = tuple(float(end) if end.strip() else None for end in (start, stop))
     except ValueError as error:
-        raise InputError(f'"{text}" is not understood', "--range", "give A:B in seconds, for example 2.5:10") from error
-    _check_range(*ends)
+        raise InputError(f'"{text}" is not understood', where, "give A:B in seconds, for example 2.5:10") from error
+    _check_range(ends[0], ends[1], where)
     return ends[0], ends[1]
 
 
-def _check_range(start: float | None, stop: float | None) -> None:
+def _check_range(start: float | None, stop: float | None, where: str = "--range") -> None:
     for end in (start, stop):
         if end is not None and not math.isfinite(end):
-            raise InputError(f"it cannot end at {end}", "--range", "give finite seconds, or leave the end out")
+            raise InputError(f"it cannot end at {end}", where, "give finite seconds, or leave the end out")
     if start is not None and stop is not None and stop <= start:
-        raise InputError(f"it ends at {stop:g} s and starts at {start:g} s", "--range", "give the earlier time first")
+        raise InputError(f"it ends at {stop:g} s and starts at {start:g} s", where, "give the earlier time first")

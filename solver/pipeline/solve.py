@@ -101,7 +101,7 @@ def session_of(request: SolveRequest) -> Session:
         path = getattr(request, name)
         if path is not None:
             session = _with_input(session, f"{name}_file", camera_file(path) if name == "camera" else path)
-    return _with_options(session, request)
+    return _with_options(_with_neutral(session, request), request)
 
 
 def _folder(request: SolveRequest) -> Path:
@@ -133,6 +133,15 @@ def _with_input(session: Session, name: str, path: Path) -> Session:
     if path.parent == session.folder and path.name in (*FILES, *SOMETIMES):
         raise InputError("would be overwritten by the results", path, "choose another folder for them")
     return replace(session, inputs={**session.inputs, name: InputFile(path)})
+
+
+def _with_neutral(session: Session, request: SolveRequest) -> Session:
+    """The file of the neutral pose; a span of the trial, or the convention's own zero, takes its place."""
+    if request.neutral is None:
+        return session
+    if isinstance(request.neutral, Path):
+        return _with_input(session, "neutral_file", request.neutral)
+    return replace(session, inputs={name: file for name, file in session.inputs.items() if name != "neutral_file"})
 
 
 def _with_options(session: Session, request: SolveRequest) -> Session:
@@ -170,6 +179,11 @@ def _said(request: SolveRequest) -> dict[str, dict[str, Any]]:
         ends = dict(zip(("start", "stop"), request.range))
         said["markers"] |= {name: end for name, end in ends.items() if end is not None}
         said["markers"][UNSET] = [name for name, end in ends.items() if end is None]
+    if request.neutral is not None:
+        span = request.neutral if isinstance(request.neutral, tuple) else (None, None)
+        ends = dict(zip(("start", "stop"), span))
+        said["neutral"] = {name: end for name, end in ends.items() if end is not None}
+        said["neutral"][UNSET] = [name for name, end in ends.items() if end is None]
     return {stage: table for stage, table in said.items() if table}
 
 

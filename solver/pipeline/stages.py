@@ -7,6 +7,7 @@ import numpy as np
 from solver.angles import AngleSettings, JointAngles
 from solver.clean.clean import Cleaned
 from solver.markers import Markers
+from solver.neutral import Neutral, NeutralSettings
 from solver.pipeline import cleaning, fitting, inputs
 from solver.pipeline.cleaning import CleaningSettings
 from solver.pipeline.inputs import LandmarkSettings, MarkerSettings, PriorSettings, SyncSettings
@@ -20,7 +21,7 @@ from solver.surface import SurfaceDistance
 from solver.sync import Sync
 from solver.video.landmarks import Landmarks
 
-SOURCES = ("marker_file", "video_file", "prior_file", "camera_file", "body_file", "weights_file")
+SOURCES = ("marker_file", "video_file", "prior_file", "camera_file", "body_file", "weights_file", "neutral_file")
 """The files a session is made from, by the names ``session.toml`` has for them."""
 
 
@@ -78,6 +79,16 @@ def _said_check(found: Verdict) -> str:
     return f"confidence {found.confidence:.2f}; {f'in doubt: {kinds}' if kinds else 'no rule speaks against it'}"
 
 
+def said_neutral(neutral: Neutral) -> str:
+    """What angles are counted from."""
+    if neutral.zero == "recorded":
+        return "none: angles are counted from the convention's zero"
+    count, expected = neutral.matched
+    if not expected:
+        return neutral.where
+    return f"{neutral.where}, {count} of {expected} markers, {1000 * neutral.residual:.1f} mm from their places"
+
+
 def _said_angles(angles: JointAngles) -> str:
     return f"{len(angles.names)} angles ({angles.title})"
 
@@ -133,7 +144,26 @@ GRAPH = (
         said_fit,
         cost=2,
     ),
-    Stage("angles", 3, AngleSettings, ("fit", "body_file"), fitting.read_angles, JointAngles, _said_angles, cost=0.1),
+    Stage(
+        "neutral",
+        1,
+        NeutralSettings,
+        ("fit", "neutral_file", "body_file"),
+        fitting.find_neutral,
+        Neutral,
+        said_neutral,
+        cost=0.2,
+    ),
+    Stage(
+        "angles",
+        4,
+        AngleSettings,
+        ("fit", "neutral", "body_file"),
+        fitting.read_angles,
+        JointAngles,
+        _said_angles,
+        cost=0.1,
+    ),
     Stage(
         "surface",
         1,

@@ -29,7 +29,7 @@ from solver.solve.problem import Problem
 from solver.solve.results import CameraResult, FittedMotion
 from solver.solve.state import Camera, Observations, State, Surface, Weights
 
-_NO_VIDEO = Weights(prior_deg=1e4, root_deg=1e4, free_camera=False, free_bias=False)
+NO_VIDEO = Weights(prior_deg=1e4, root_deg=1e4, free_camera=False, free_bias=False)
 _REACH = (
     Phase(0.10, 1.0, 8, free_shape=False),
     Phase(0.04, 0.4, 8, free_shape=False),
@@ -74,7 +74,7 @@ class LabelledSettings:
     def weights(self) -> Weights:
         """The same as weights of the fit."""
         return replace(
-            _NO_VIDEO,
+            NO_VIDEO,
             offset=self.offset_mm / 1000,
             offset_spread=self.offset_spread_mm / 1000,
             shape=self.shape,
