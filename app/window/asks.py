@@ -11,14 +11,15 @@ from PySide6.QtWidgets import QFileDialog, QInputDialog, QMessageBox
 from app.window.exporting import ask_what_to_export, report_pictures
 from app.window.importing import ask_how_to_import
 from app.window.showing import Showing
+from app.window.videos import dialog_filter
 
 if TYPE_CHECKING:
     from app.window.main import MainWindow
 
 _FILES = {
-    "markers": ("Open markers", "Markers (*.c3d *.trc *.csv *.tsv);;All files (*)"),
-    "video": ("Add video", "Videos (*.mp4 *.mov *.avi *.mkv *.m4v *.webm);;All files (*)"),
-    "prior": ("Add pose prior", "Poses (*.npz *.pkl *.pth *.pt *.json);;All files (*)"),
+    "markers": ("Open markers", "Markers (*.c3d *.trc *.csv *.tsv *.txt *.C3D *.TRC *.CSV *.TSV *.TXT);;All files (*)"),
+    "video": ("Add video", dialog_filter()),
+    "prior": ("Add pose prior", "Poses (*.npz *.pkl *.pth *.pt *.npy *.json);;All files (*)"),
     "camera": ("Add camera", "Camera (camera.json *.json);;All files (*)"),
     "neutral": ("Static trial for the neutral pose", "Markers (*.c3d *.trc *.csv *.tsv);;All files (*)"),
     "body": ("Use another body", "SMPL-layout models (*.npz *.pkl);;All files (*)"),

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QDialog, QWidget
 
 from app.models.imports import new_session
 from app.views.preview import ImportPreview, preview_of
+from app.window.videos import videos_beside
 from solver.errors import InputError
 from solver.markers import UpAxis
 from widgets.dialogs.import_data import ImportChoice, ImportShown
@@ -84,7 +85,7 @@ def ask_how_to_import(
             dialog.set_video(str(chosen))
 
     dialog.video_wanted.connect(choose_video)
-    beside = [file for suffix in (".mp4", ".mov", ".avi", ".mkv") if (file := path.with_suffix(suffix)).exists()]
+    beside = videos_beside(path)
     if proposed is not None or beside:
         dialog.set_video(str(proposed or beside[0]))
     agreed = dialog.exec() == QDialog.DialogCode.Accepted

@@ -38,6 +38,7 @@ from app.window.group_menu import SceneMenu
 from app.window.keys import wants
 from app.window.remembering import parts_of, restore
 from app.window.shown import Shown
+from app.window.videos import is_video
 from widgets.panels.dated import Dated
 from widgets.panels.history import HistoryList
 from widgets.panels.hypotheses import HypothesesView
@@ -56,7 +57,6 @@ from widgets.tables.candidates import CandidateTable
 from widgets.tables.markers import MarkerTable
 from widgets.video import VideoView
 
-VIDEOS = (".mp4", ".mov", ".avi", ".mkv", ".m4v", ".webm")
 BUSY_MS, IDLE_MS, REMEMBER_MS = 12, 60, 1500
 _LEFT = Qt.DockWidgetArea.LeftDockWidgetArea
 _RIGHT = Qt.DockWidgetArea.RightDockWidgetArea
@@ -277,7 +277,7 @@ class MainWindow(QMainWindow):
 
     def drop(self, paths: list[Path]) -> None:
         """Take files that were dropped: a session or a marker file, perhaps with its video; or a video alone."""
-        videos = [path for path in paths if path.suffix.lower() in VIDEOS]
+        videos = [path for path in paths if is_video(path)]
         others = [path for path in paths if path not in videos]
         if others:
             self.dropped_video = videos[0] if videos else None

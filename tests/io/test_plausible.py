@@ -69,7 +69,7 @@ def test_every_note_reaches_the_summary_and_both_lists(tmp_path: Path) -> None:
     data = c3d_bytes(xyz, analog=np.zeros((40, 10, 5)), header={"count": 4}, groups=events)
     (tmp_path / "a.c3d").write_bytes(data)
     notes = load_markers(tmp_path / "a.c3d").notes
-    held = "5 analog channels, 2 force plates, 3 events and 1 further parameter of the C3D are not carried over"
+    held = "The C3D also holds 5 analog channels, 2 force plates, 3 events and 1 further parameter: kept where a C3D"
     assert any(held in note for note in notes)
     assert any("disagree" in note or "number of points" in note for note in notes)
     done = clean_file(CleanRequest(markers=tmp_path / "a.c3d", out=tmp_path / "b.csv"))
