@@ -16,7 +16,7 @@ _TIE = 1.15
 _STEEPNESS = 8.5
 """Told from 400 synthetic sessions of ``markerscope bench``: with it, which were right was likeliest."""
 _UNRIVALLED = 0.95
-"""Where no other answer was found, or all that were followed ran into the best, nothing says how far the next one is. All
+"""Where no other answer was found, or all that were followed ran into the best, nothing says how far the next is. All
 of 51 synthetic sessions of that kind (``benchmarks/traps.py``) were right."""
 
 
