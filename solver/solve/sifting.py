@@ -1,4 +1,4 @@
-"""Markers that fit no place on the body, found after a fit; and the price of the video's mirror image."""
+"""Markers that fit no place on the body, found after a fit."""
 
 from __future__ import annotations
 

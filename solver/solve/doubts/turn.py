@@ -51,12 +51,12 @@ def _without_bias(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
 
 
 def holds_pelvis(joint: np.ndarray) -> bool:
-    """Whether markers (M,), by their bones, hold the pelvis: on itself, the trunk, or both thighs.
+    """Whether markers (M,), by their bones, hold the pelvis: on itself, the lower back, or both thighs.
 
     Of a lone limb, or of two arms, the pelvis is where the video has it, and says nothing of the camera.
     """
     marked = {JOINTS[j] for j in joint if j >= 0}
-    return bool(marked & {"pelvis", "spine1", "spine2", "spine3"}) or {"left_hip", "right_hip"} <= marked
+    return bool(marked & {"pelvis", "spine1"}) or {"left_hip", "right_hip"} <= marked
 
 
 def turning_camera(seen: Evidence) -> Doubt | None:
