@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.angles import AngleSettings, JointAngles
+from solver.body.model import EMBEDDED
 from solver.clean.clean import Cleaned
 from solver.markers import Markers
 from solver.pipeline import cleaning, fitting, inputs
@@ -74,6 +75,8 @@ def _said_angles(angles: JointAngles) -> str:
 
 FITTED_TO = ("clean", "prior", "landmarks", "sync", "body_file")
 """What every stage of the fit looks at."""
+BODY = (EMBEDDED,)
+"""Read by every stage that sees a body: a user's own, too, takes its landmarks from the embedded one."""
 
 GRAPH = (
     Stage("markers", 1, MarkerSettings, ("marker_file",), inputs.read_markers, Markers, _said_markers, cost=0.5),
@@ -90,8 +93,18 @@ GRAPH = (
         _said_landmarks,
         cost=16,
     ),
-    Stage("prior", 1, PriorSettings, ("prior_file", "landmarks"), inputs.pose_prior, PosePrior, cost=2),
-    Stage("sync", 1, SyncSettings, ("clean", "landmarks", "prior"), inputs.synchronise, Sync, _said_sync, cost=1),
+    Stage("prior", 1, PriorSettings, ("prior_file", "landmarks"), inputs.pose_prior, PosePrior, cost=2, shipped=BODY),
+    Stage(
+        "sync",
+        1,
+        SyncSettings,
+        ("clean", "landmarks", "prior"),
+        inputs.synchronise,
+        Sync,
+        _said_sync,
+        cost=1,
+        shipped=BODY,
+    ),
     Stage("segment", 1, SegmentSettings, ("clean",), fitting.group_markers, Segmentation, said_segmentation, cost=0.3),
     Stage(
         "localize",
@@ -102,6 +115,7 @@ GRAPH = (
         Localization,
         _said_localization,
         cost=2,
+        shipped=BODY,
     ),
     Stage(
         "orient",
@@ -112,6 +126,7 @@ GRAPH = (
         Orientation,
         said_orientation,
         cost=5,
+        shipped=BODY,
     ),
     Stage(
         "fit",
@@ -122,8 +137,19 @@ GRAPH = (
         FittedMotion,
         said_fit,
         cost=2,
+        shipped=BODY,
     ),
-    Stage("angles", 2, AngleSettings, ("fit", "body_file"), fitting.read_angles, JointAngles, _said_angles, cost=0.1),
+    Stage(
+        "angles",
+        3,
+        AngleSettings,
+        ("fit", "body_file"),
+        fitting.read_angles,
+        JointAngles,
+        _said_angles,
+        cost=0.1,
+        shipped=BODY,
+    ),
     Stage(
         "surface",
         1,
@@ -133,6 +159,7 @@ GRAPH = (
         SurfaceDistance,
         _said_surface,
         cost=2,
+        shipped=BODY,
     ),
 )
 """Every stage of the default method."""
