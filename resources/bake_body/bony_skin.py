@@ -16,6 +16,8 @@ from resources.bake_body.picker import Landmark, Picker
 from solver.body.skeleton import INDEX, JOINTS
 
 TABLE = Path(__file__).with_name("bony_landmarks.toml")
+_SURE = 1e-6
+"""What a claim that is beyond doubt leaves to others."""
 STEP = 0.005
 """m between the points that an edge of bone is followed by."""
 
@@ -66,7 +68,8 @@ def rigid_weights(
 ) -> np.ndarray:
     """(V, 24) weights with the skin about bony landmarks on its bone.
 
-    Where several bones claim a place, as at the elbow, they share it by how near each is.
+    Where several bones claim a place, as at the elbow, they share it by the odds of their claims, so that what is in
+    the core of one is its alone.
 
     Parameters
     ----------
@@ -80,8 +83,9 @@ def rigid_weights(
     for row in table:
         distance = _along_the_skin(graph, picker, skin, [found[name] for name in row.along], row.reach)
         claim[:, row.bone] = np.maximum(claim[:, row.bone], _falloff(distance, row.core, row.reach))
-    total = claim.sum(axis=1, keepdims=True)
-    return claim / np.maximum(total, 1) + (1 - np.minimum(total, 1)) * weights
+    odds = claim / (1 - claim + _SURE)
+    left = (1 - claim).prod(axis=1, keepdims=True)
+    return (1 - left) * odds / np.maximum(odds.sum(axis=1, keepdims=True), 1e-12) + left * weights
 
 
 def _falloff(distance: np.ndarray, core: float, reach: float) -> np.ndarray:

@@ -13,7 +13,10 @@ shoulder centre of rotation under the acromion. In the model of Rajagopal et al.
          the acromion's bone, 3 mm lateral of its edge and 14 mm in front of that; with 4 mm of skin this is 10 % of an
          average biacromial width of 380 mm down and 1 % outward. Forward it stays at 2 %, 8 mm, as the acromion's
          landmark lies above the middle of the bone. de Leva 1996 (J Biomech 29:1223) has 35 mm down
-elbow    midway between the humeral epicondyles (ISB, Wu et al. 2005)
+elbow    on the axis of flexion, which passes in front of and below the line through the humeral epicondyles: from
+         midway between them 2.3 % of the upper arm's length to the front and as much down, 1.9 % to the medial side, as
+         the elbow of Rajagopal et al. 2016 lies to the epicondyles of its humerus (6.5, 6.5, 5.4 of 280 mm). Stokdijk
+         et al. 1999 (Clin Biomech 14:177) found it in front of the lateral epicondyle in ten arms, too
 wrist    midway between the radial and ulnar styloids (ISB, Wu et al. 2005)
 hand     head of the third metacarpal, two fifths of the way from the back of the hand to the palm
 ======== =====================================================================================================
@@ -41,6 +44,8 @@ KNUCKLE = 0.4
 """How deep the head of the third metacarpal lies between back and palm of the hand, which is padded."""
 SHOULDER = {"outward": 0.01, "down": 0.10, "forward": 0.02}
 """Shoulder from the acromion, over the biacromial width."""
+ELBOW = {"forward": 0.023, "down": 0.023, "medial": 0.019}
+"""Elbow from midway between the epicondyles, over the length of the upper arm."""
 ANKLE_DOWN = 0.006
 """Ankle from midway between the malleoli, over stature: 10 mm."""
 
@@ -61,8 +66,21 @@ def correct(joints: np.ndarray, vertices: np.ndarray, landmarks: dict[str, Landm
         moved[:, INDEX[f"{side}_ankle"], 1] -= ANKLE_DOWN * stature
         offset = np.array([sign * SHOULDER["outward"], -SHOULDER["down"], SHOULDER["forward"]])
         moved[:, INDEX[f"{side}_shoulder"]] = at[f"{side}_acromion"] + width[:, None] * offset
+        lateral = at[f"{side}_elbow_lateral"] - at[f"{side}_elbow_medial"]
+        moved[:, INDEX[f"{side}_elbow"]] = elbow_centre(
+            moved[:, INDEX[f"{side}_shoulder"]], moved[:, INDEX[f"{side}_elbow"]], lateral, sign
+        )
     moved[:, 0] += (moved[:, [1, 2]] - joints[:, [1, 2]]).mean(axis=1) / 2
     return moved
+
+
+def elbow_centre(shoulder: np.ndarray, middle: np.ndarray, lateral: np.ndarray, sign: float) -> np.ndarray:
+    """(N, 3) m, from midway between the epicondyles; ``lateral`` points from the medial one, sign is 1 on the left."""
+    length = np.linalg.norm(middle - shoulder, axis=-1, keepdims=True)
+    down = (middle - shoulder) / length
+    outward = _unit(lateral - down * np.sum(lateral * down, axis=-1, keepdims=True))
+    forward = sign * np.cross(down, outward)
+    return middle + length * (ELBOW["forward"] * forward + ELBOW["down"] * down - ELBOW["medial"] * outward)
 
 
 def hip_centres(

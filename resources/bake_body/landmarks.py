@@ -38,8 +38,10 @@ SCAPULAR_SPINE_ASIDE = 0.049
 """Root of the scapula's spine from the midline, over stature: 83 mm of 1.70 m in Rajagopal et al. (2016)."""
 CLAVICLE_ASIDE = 0.03
 """The inner third of the clavicle, over stature: 50 mm beside the midline. Its end at the sternum hardly moves."""
-TIBIAL_TUBEROSITY, FIBULA_HEAD = 0.13, 0.13
-"""How far below the knee's centre, over the length of the shank: 52 and 50 mm of 394 in Rajagopal et al. (2016)."""
+TIBIAL_TUBEROSITY, FIBULA_HEAD = 0.15, 0.14
+"""How far below the knee's centre, over the length of the shank: 60 and 56 mm of 400 in Rajagopal et al. (2016)."""
+FIBULA_BEHIND = np.radians(34)
+"""Direction of the fibula's head from the shank's axis, behind lateral (the same)."""
 BIACROMIAL = 0.2245
 """Distance between the acromia over stature."""
 WRIST_BEYOND_RIG = 0.008
@@ -145,7 +147,8 @@ def _leg(body: Mannequin) -> dict[str, Landmark]:
     outward /= np.linalg.norm(outward)
     below = knee + (ankle - knee) * np.array([[TIBIAL_TUBEROSITY], [FIBULA_HEAD]])
     found["{side}_tibial_tuberosity"] = body.picker.surface(below[0], _unit(np.cross(shank, outward)), limb)
-    found["{side}_fibula_head"] = body.picker.surface(below[1], _unit(outward - np.cross(shank, outward)), limb)
+    aside = np.cos(FIBULA_BEHIND) * outward - np.sin(FIBULA_BEHIND) * np.cross(shank, outward)
+    found["{side}_fibula_head"] = body.picker.surface(below[1], aside, limb)
     for name, direction, shift in (("medial", -LEFT, 0.009), ("lateral", LEFT, -0.009)):
         origin = np.array([ankle[0], body.height(HEIGHTS[f"ankle_{name}"]), ankle[2] + shift])
         found[f"{{side}}_ankle_{name}"] = body.picker.surface(origin, direction, lower)

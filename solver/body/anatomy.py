@@ -26,10 +26,10 @@ MODEL_THORAX = {
 """m forward and up in the torso of Rajagopal et al. (2016): spinous processes, jugular notch and end of the sternum,
 read off the bones ``hat_spine`` and ``hat_ribs_scap``, and 10 mm of skin behind, 5 on the notch, 8 on the xiphoid."""
 
-_ARM_FORWARD, _ARM_OUTWARD, _ARM_INWARD_TURN = np.radians([-1.5, -0.7, -7.9])
+_ARM_FORWARD, _ARM_OUTWARD, _ARM_INWARD_TURN = np.radians([-2.9, -1.5, -7.9])
 """The humerus' frame in the model of Rajagopal et al. 2016 (whose bone is ``humerus_rv``), seen from the frame that the
-same bone's epicondyles and the centre of its head make: turns about Z, X and Y of the right arm. The line through the
-epicondyles points 8 degrees forward of the model's Z axis."""
+same bone's epicondyles and the model's shoulder and elbow make: turns about Z, X and Y of the right arm. The line
+through the epicondyles points 8 degrees forward of the model's Z axis, the elbow in front of its Y axis."""
 
 SEGMENT_JOINT = {
     "pelvis": "pelvis",

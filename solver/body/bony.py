@@ -40,7 +40,7 @@ class BonySites:
         flat = self.vertices.ravel()
         around = normals_at(surface, body.faces, body.faces_around[flat]).reshape(*self.vertices.shape, 3)
         mean = np.einsum("lk,lkd->ld", self.values, around)
-        return mean / np.linalg.norm(mean, axis=1, keepdims=True)
+        return mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)
 
 
 def bony_sites(body: Body) -> BonySites:

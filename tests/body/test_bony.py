@@ -139,3 +139,13 @@ def test_bodies_that_touch_do_not_share_skin():
     row = bony_skin.BonySkin(("inside",), 4, 0.03, 0.07, True)
     weights = rigid(vertices, np.vstack([faces, faces + len(one)]), row, inside=np.array([0.04, 0, 0]))
     assert weights[: len(one), 4].max() == 1 and weights[len(one) :, 4].max() == 0
+
+
+def test_the_core_of_one_bone_is_its_alone():
+    """A landmark whose neighbour's falloff reaches it, as the lateral malleolus lies beside the heel."""
+    vertices, faces = tube()
+    one, other = np.array([0.04, 0, 0]), np.array([0.04, 0, 0.04])
+    rows = [bony_skin.BonySkin((name,), bone, 0.02, 0.06, True) for name, bone in (("one", 4), ("other", 5))]
+    weights = rigid(vertices, faces, *rows, one=one, other=other)
+    near = np.linalg.norm(vertices - one, axis=1) < 0.01
+    assert weights[near, 4].min() > 0.999
