@@ -149,8 +149,7 @@ def joint_angles(
     frames = segment_frames(
         landmarks,
         joints,
-        upright_trunk=convention["pelvis"] == "upright",
-        ulnar_forearm=convention["forearm"] == "ulna",
+        **{name: convention[name] for name in ("pelvis", "thorax", "upper_arm", "forearm")},
     )
     turn = world_rotations(rotations)
     segments = {name: turn[:, INDEX[SEGMENT_JOINT[name]]] @ frame for name, frame in frames.items()}

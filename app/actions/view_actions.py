@@ -22,7 +22,7 @@ _CAMERAS = {
 }  # fmt: skip
 TEXT_PERCENT = (100, 125, 150)
 """Sizes of text, of the desktop's own."""
-_LAYER_KEYS = {"labels": "L", "trails": "T", "body": "B", "skeleton": "K", "ghosts": "H"}
+_LAYER_KEYS = {"labels": "L", "trails": "T", "body": "B", "skeleton": "K", "bones": "Shift+K", "ghosts": "H"}
 
 
 def _colour(colour: ColourBy, number: int) -> Action:

@@ -19,6 +19,7 @@ LAYERS = {
     "floor": ("Floor and axes", True),
     "body": ("Body", True),
     "skeleton": ("Skeleton", True),
+    "bones": ("Bones", True),
     "links": ("Lines from markers to the skin", False),
     "ghosts": ("Ghosts of other answers", True),
     "landmarks": ("Landmarks in the video", True),

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from app.views.posing import Detail, Pose, PosedPoints, fixed_points, mesh_of, pose_at, skin_points
+from app.views.posing import Detail, Pose, PosedPoints, bones_of, fixed_points, mesh_of, pose_at, skin_points
 from solver.body.model import Body
 from solver.localize import R_LAB_UPRIGHT_CAMERA
 from solver.markers import Markers
@@ -58,6 +58,11 @@ class BodyTrack:
         return mesh_of(self.body, self.betas, "full")
 
     @cached_property
+    def bones(self) -> PosedPoints:
+        """The bones inside."""
+        return bones_of(self.body, self.betas)
+
+    @cached_property
     def skin(self) -> PosedPoints:
         """(U) the vertex below each marker."""
         return skin_points(self.body, self.betas, self.vertex)
@@ -78,7 +83,7 @@ class BodyTrack:
 
     def ready(self) -> BodyTrack:
         """Make every skin now and not when it is first drawn; the same track."""
-        _ = self.coarse, self.full, self.skin
+        _ = self.coarse, self.full, self.bones, self.skin
         return self
 
     def nearest(self, time: float) -> int:

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from solver.body.bone_meshes import bone_meshes
 from solver.body.model import Body, chain
 from solver.body.skeleton import JOINTS, PARENTS
 from solver.rotations import slerp
@@ -101,6 +102,13 @@ def mesh_of(body: Body, betas: np.ndarray, detail: Detail = "full") -> PosedPoin
 def skin_points(body: Body, betas: np.ndarray, vertices: np.ndarray) -> PosedPoints:
     """Some vertices of the skin, in the order given."""
     return _points(body, betas, vertices, np.zeros((0, 3), dtype=np.intp))
+
+
+def bones_of(body: Body, betas: np.ndarray) -> PosedPoints:
+    """The bones inside a body of one shape, or of its first coefficients."""
+    meshes = bone_meshes()
+    every = np.pad(betas, (0, body.shape_count - len(betas)))
+    return PosedPoints(_features(meshes.rest(body, every), meshes.weights), body.joints(every), meshes.faces)
 
 
 def fixed_points(body: Body, betas: np.ndarray, rest: np.ndarray, dirs: np.ndarray, weights: np.ndarray) -> PosedPoints:

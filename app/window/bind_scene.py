@@ -21,6 +21,7 @@ from widgets.scene import ColourBar, Scene3D
 from widgets.scene import Legend as Drawn
 
 _NONE = np.zeros((0, 3))
+_IVORY = (238, 230, 210)
 TROUBLE_REMEDY = "all else works on; save the session, and open it again if it does not come back by itself"
 """What to do where a view cannot be drawn."""
 OUT_OF_DATE = "Out of date"
@@ -43,6 +44,7 @@ class SceneBinder:
         self._framed = False
         self._own_view: dict[str, Any] | None = None
         self._body: tuple[object, ...] | None = None
+        self._bones: tuple[BodyTrack, float] | None = None
         self._legend: tuple[object, ...] | None = None
         self._ghost_layers: set[str] = set()
         bench.clock.moved.connect(lambda time: self.draw())
@@ -97,6 +99,11 @@ class SceneBinder:
         else:
             assert track is not None
             self._show_body(track, time, display.opacity, self.shown.stale("fit"))
+        if hidden or not display.layers["bones"]:
+            self._clear_bones()
+        else:
+            assert track is not None
+            self._show_bones(track, time)
         joints = None if hidden or not display.layers["skeleton"] else track.joints(time)  # type: ignore[union-attr]
         widget.set_bones("skeleton", joints, BONE_EDGES, self._bone_colours())
         if hidden or not display.layers["links"]:
@@ -122,6 +129,17 @@ class SceneBinder:
                     _striped(track.full_bands) if old else np.array(theme.colours().body),
                 ),
             )  # fmt: skip
+
+    def _show_bones(self, track: BodyTrack, time: float) -> None:
+        """The bones inside the body; as they are where they are these already."""
+        wanted = track, time
+        if self._bones is None or self._bones[0] is not track or self._bones[1] != time:
+            self._bones = wanted
+            self.widget.set_mesh("bones", track.bones.at(track.pose(time)), track.bones.faces, _IVORY)
+
+    def _clear_bones(self) -> None:
+        self._bones = None
+        self.widget.set_mesh("bones", None, _NONE)
 
     def _clear_body(self) -> None:
         self._body = None
@@ -179,6 +197,7 @@ class SceneBinder:
     def _clear(self) -> None:
         self.widget.set_markers(_NONE, np.zeros((0, 3), np.uint8))
         self._clear_body()
+        self._clear_bones()
         self.widget.set_bones("skeleton", None, BONE_EDGES)
         self.widget.set_lines("links", None, None)
         self.widget.set_legend("", None)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from resources.bake_body import coarse, joint_centres, landmarks, markers, proportions, rig, source, tpose
+from resources.bake_body import bony_skin, coarse, joint_centres, landmarks, markers, proportions, rig, source, tpose
 from resources.bake_body.picker import CORNERS, Landmark, Picker
 from resources.bake_body.report import report_joints, report_shapes
 from resources.bake_body.shape_space import ShapeSpace, fit_shape_space
@@ -60,6 +60,10 @@ def bake(sample: source.Sample) -> dict[str, np.ndarray]:
     found = landmarks.pick(mannequin)
     joints = joint_centres.correct(rigged, vertices, found)
     report_joints(rigged, joints)
+    bony = bony_skin.read_table()
+    weights = bony_skin.rigid_weights(weights, picker, ~inner, found, bony)
+    weights = rig.top_weights((weights + weights[twin][:, other]) / 2)
+    bony_skin.report_skin(weights, found, bony)
 
     at = {name: landmark.of(vertices) for name, landmark in found.items()}
     skin, placed = tpose.straighten(joints, vertices, weights, at)
@@ -95,12 +99,12 @@ def bake(sample: source.Sample) -> dict[str, np.ndarray]:
         "lod_f": lod_faces.astype(np.int32),
         "marker_mask": mask,
         "vertex_area": area.astype(np.float32),
-        **_landmark_arrays(found),
+        **_landmark_arrays(found, bony_skin.bones_of_landmarks(bony)),
     }
 
 
-def _landmark_arrays(found: dict[str, Landmark]) -> dict[str, np.ndarray]:
-    """The 33 BlazePose points first and in their order, then the bony landmarks by name."""
+def _landmark_arrays(found: dict[str, Landmark], bones: dict[str, int]) -> dict[str, np.ndarray]:
+    """The 33 BlazePose points first and in their order, then the others by name, bony ones with their bone."""
     network = [f"bp_{name}" for name in LANDMARKS]
     names = network + sorted(name for name in found if not name.startswith("bp_"))
     vertices = np.zeros((len(names), CORNERS), dtype=np.int32)
@@ -117,6 +121,7 @@ def _landmark_arrays(found: dict[str, Landmark]) -> dict[str, np.ndarray]:
         "landmark_vertices": vertices,
         "landmark_values": values,
         "landmark_joint": joint,
+        "landmark_bone": np.array([bones.get(name, -1) for name in names], dtype=np.int8),
     }
 
 

@@ -31,9 +31,10 @@ def coarse_mesh(
     dual = _dual(faces, _regions(graph, seeds))
     for _ in range(REPAIRS):
         bad = bad_edges(dual)
-        if not len(bad):
+        around = bad[0] if len(bad) else pinched_vertices(dual)[:1]
+        if not len(around):
             break
-        seeds = np.append(seeds, _farthest(graph, allowed, seeds, bad[0]))
+        seeds = np.append(seeds, _farthest(graph, allowed, seeds, around))
         dual = _dual(faces, _regions(graph, seeds))
     used = np.unique(dual)
     place = np.full(len(seeds), -1)
@@ -103,3 +104,19 @@ def bad_edges(faces: np.ndarray) -> np.ndarray:
     present = {(int(a), int(b)) for a, b in edges}
     lonely = np.array([(int(b), int(a)) not in present for a, b in edges], dtype=bool)
     return edges[lonely | (counts > 1)]
+
+
+def pinched_vertices(faces: np.ndarray) -> np.ndarray:
+    """(n,) vertices of a closed mesh whose faces are not one fan: where two parts of it touch in a point."""
+    corners, ahead, behind = faces.ravel(), faces[:, [1, 2, 0]].ravel(), faces[:, [2, 0, 1]].ravel()
+    found = []
+    for vertex in np.unique(faces):
+        own = corners == vertex
+        beyond = dict(zip(ahead[own].tolist(), behind[own].tolist()))
+        start = next(iter(beyond))
+        at, fan = beyond[start], 1
+        while at != start:
+            at, fan = beyond[at], fan + 1
+        if fan < len(beyond):
+            found.append(vertex)
+    return np.array(found, dtype=int)

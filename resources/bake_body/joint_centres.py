@@ -3,13 +3,20 @@
 ======== =====================================================================================================
 hip      Harrington et al. 2007 (J Biomech 40:595), from the pelvis' place and tilt on the mesh and its average size
 knee     midway between the femoral epicondyles (ISB, Wu et al. 2002)
-ankle    midway between the malleoli (ISB, Wu et al. 2002)
+ankle    10 mm below the point midway between the malleoli where they stand out most: there the ankle's axis passes,
+         just below the tips of both (Isman and Inman 1969, Bull Prosthet Res 10-11:97). In the model of Rajagopal et
+         al. 2016 (IEEE Trans Biomed Eng 63:2068) it is 11 mm below the middle of the malleolar markers and 14 below
+         that of the bones; Winter (Biomechanics and Motor Control of Human Movement) has the ankle at 0.039 of
+         stature, 13 mm below that middle
 foot     midway between back and sole of the foot at the head of the second metatarsal
-shoulder centre of the humeral head under the acromion: 12 % of the biacromial width down, 3 % inward, 2 % forward.
-         Acromion (8 mm), subacromial space (10), the head's radius (24) and skin (4) make 46 mm, 12 % of an average
-         380 mm; de Leva 1996 (J Biomech 29:1223) has 35 mm, Rab et al. 2002 (Gait Posture 15:182) 17 % from a
-         marker's centre, some 55 mm from the skin
-elbow    midway between the humeral epicondyles (ISB, Wu et al. 2005)
+shoulder centre of rotation under the acromion. In the model of Rajagopal et al. 2016 it lies 33 mm below the top of
+         the acromion's bone, 3 mm lateral of its edge and 14 mm in front of that; with 4 mm of skin this is 10 % of an
+         average biacromial width of 380 mm down and 1 % outward. Forward it stays at 2 %, 8 mm, as the acromion's
+         landmark lies above the middle of the bone. de Leva 1996 (J Biomech 29:1223) has 35 mm down
+elbow    on the axis of flexion, which passes in front of and below the line through the humeral epicondyles: from
+         midway between them 2.3 % of the upper arm's length to the front and as much down, 1.9 % to the medial side, as
+         the elbow of Rajagopal et al. 2016 lies to the epicondyles of its humerus (6.5, 6.5, 5.4 of 280 mm). Stokdijk
+         et al. 1999 (Clin Biomech 14:177) found it in front of the lateral epicondyle in ten arms, too
 wrist    midway between the radial and ulnar styloids (ISB, Wu et al. 2005)
 hand     head of the third metacarpal, two fifths of the way from the back of the hand to the palm
 ======== =====================================================================================================
@@ -35,8 +42,12 @@ MIDWAY = (
 """Joints between two landmarks each."""
 KNUCKLE = 0.4
 """How deep the head of the third metacarpal lies between back and palm of the hand, which is padded."""
-SHOULDER = {"inward": 0.03, "down": 0.12, "forward": 0.02}
-"""Humeral head from the acromion, over the biacromial width."""
+SHOULDER = {"outward": 0.01, "down": 0.10, "forward": 0.02}
+"""Shoulder from the acromion, over the biacromial width."""
+ELBOW = {"forward": 0.023, "down": 0.023, "medial": 0.019}
+"""Elbow from midway between the epicondyles, over the length of the upper arm."""
+ANKLE_DOWN = 0.006
+"""Ankle from midway between the malleoli, over stature: 10 mm."""
 
 
 def correct(joints: np.ndarray, vertices: np.ndarray, landmarks: dict[str, Landmark]) -> np.ndarray:
@@ -52,10 +63,24 @@ def correct(joints: np.ndarray, vertices: np.ndarray, landmarks: dict[str, Landm
             share = KNUCKLE if joint == "hand" else 0.5
             start, end = at[f"{side}_{one}"], at[f"{side}_{other}"]
             moved[:, INDEX[f"{side}_{joint}"]] = start + share * (end - start)
-        offset = np.array([-sign * SHOULDER["inward"], -SHOULDER["down"], SHOULDER["forward"]])
+        moved[:, INDEX[f"{side}_ankle"], 1] -= ANKLE_DOWN * stature
+        offset = np.array([sign * SHOULDER["outward"], -SHOULDER["down"], SHOULDER["forward"]])
         moved[:, INDEX[f"{side}_shoulder"]] = at[f"{side}_acromion"] + width[:, None] * offset
+        lateral = at[f"{side}_elbow_lateral"] - at[f"{side}_elbow_medial"]
+        moved[:, INDEX[f"{side}_elbow"]] = elbow_centre(
+            moved[:, INDEX[f"{side}_shoulder"]], moved[:, INDEX[f"{side}_elbow"]], lateral, sign
+        )
     moved[:, 0] += (moved[:, [1, 2]] - joints[:, [1, 2]]).mean(axis=1) / 2
     return moved
+
+
+def elbow_centre(shoulder: np.ndarray, middle: np.ndarray, lateral: np.ndarray, sign: float) -> np.ndarray:
+    """(N, 3) m, from midway between the epicondyles; ``lateral`` points from the medial one, sign is 1 on the left."""
+    length = np.linalg.norm(middle - shoulder, axis=-1, keepdims=True)
+    down = (middle - shoulder) / length
+    outward = _unit(lateral - down * np.sum(lateral * down, axis=-1, keepdims=True))
+    forward = sign * np.cross(down, outward)
+    return middle + length * (ELBOW["forward"] * forward + ELBOW["down"] * down - ELBOW["medial"] * outward)
 
 
 def hip_centres(

@@ -26,12 +26,22 @@ HEIGHTS = {
     "ankle_lateral": 0.043,
     "calcaneus": 0.016,
     "heel": 0.006,
+    "iliac_crest": 0.609,  # iliocristale
+    "scapular_spine": 0.822,  # third thoracic vertebra: three eighths of the way from c7 to t8
 }
 """Landmark heights as fractions of stature."""
 SPINES_WIDTH = 0.053
 """Distance between the posterior superior iliac spines over stature."""
 PELVIC_TILT = np.radians(10.0)
 """Forward tilt, in quiet standing, of the plane through the four iliac spines."""
+SCAPULAR_SPINE_ASIDE = 0.049
+"""Root of the scapula's spine from the midline, over stature: 83 mm of 1.70 m in Rajagopal et al. (2016)."""
+CLAVICLE_ASIDE = 0.03
+"""The inner third of the clavicle, over stature: 50 mm beside the midline. Its end at the sternum hardly moves."""
+TIBIAL_TUBEROSITY, FIBULA_HEAD = 0.15, 0.14
+"""How far below the knee's centre, over the length of the shank: 60 and 56 mm of 400 in Rajagopal et al. (2016)."""
+FIBULA_BEHIND = np.radians(34)
+"""Direction of the fibula's head from the shank's axis, behind lateral (the same)."""
 BIACROMIAL = 0.2245
 """Distance between the acromia over stature."""
 WRIST_BEYOND_RIG = 0.008
@@ -83,7 +93,9 @@ def pick(body: Mannequin) -> dict[str, Landmark]:
     for name, landmark in left.items():
         found[name.format(side="left")] = landmark
         found[name.format(side="right")] = landmark.mirrored(body.twin)
-    found["sacrum"] = mean(found["left_psis"], found["right_psis"])
+    spines = found["left_psis"].of(body.picker.vertices)
+    trunk = body.part("pelvis", "spine1", "spine2")
+    found["sacrum"] = body.picker.surface(np.array([0, spines[1], spines[2] / 2]), -FRONT, trunk)
     return found
 
 
@@ -112,7 +124,8 @@ def _pelvis(body: Mannequin) -> dict[str, Landmark]:
     asis = body.picker.surface(np.array([width / 2, height, hip[2]]), FRONT, trunk)
     across = SPINES_WIDTH * body.stature / 2
     psis = body.picker.surface(np.array([across, height + depth * np.tan(PELVIC_TILT), 0]), -FRONT, trunk)
-    return {"{side}_asis": asis, "{side}_psis": psis}
+    crest = body.picker.surface(np.array([0, body.height(HEIGHTS["iliac_crest"]), 0]), LEFT, trunk)
+    return {"{side}_asis": asis, "{side}_psis": psis, "{side}_iliac_crest": crest}
 
 
 def _leg(body: Mannequin) -> dict[str, Landmark]:
@@ -129,6 +142,13 @@ def _leg(body: Mannequin) -> dict[str, Landmark]:
         "{side}_knee_medial": body.picker.surface(middle, -across, limb),
     }
     lower = body.part("left_knee", "left_ankle")
+    shank = (ankle - knee) / np.linalg.norm(ankle - knee)
+    outward = across - shank * (shank @ across)
+    outward /= np.linalg.norm(outward)
+    below = knee + (ankle - knee) * np.array([[TIBIAL_TUBEROSITY], [FIBULA_HEAD]])
+    found["{side}_tibial_tuberosity"] = body.picker.surface(below[0], _unit(np.cross(shank, outward)), limb)
+    aside = np.cos(FIBULA_BEHIND) * outward - np.sin(FIBULA_BEHIND) * np.cross(shank, outward)
+    found["{side}_fibula_head"] = body.picker.surface(below[1], aside, limb)
     for name, direction, shift in (("medial", -LEFT, 0.009), ("lateral", LEFT, -0.009)):
         origin = np.array([ankle[0], body.height(HEIGHTS[f"ankle_{name}"]), ankle[2] + shift])
         found[f"{{side}}_ankle_{name}"] = body.picker.surface(origin, direction, lower)
@@ -166,6 +186,11 @@ def _arm(body: Mannequin) -> dict[str, Landmark]:
     girdle = body.part("left_collar", "left_shoulder", "spine3")
     above = np.array([BIACROMIAL * body.stature / 2, shoulder[1], shoulder[2] - 0.005])
     found = {"{side}_acromion": body.picker.surface(above, UP, girdle)}
+    trunk = body.part("spine3", "neck", "left_collar", "left_shoulder")
+    clavicle = np.array([CLAVICLE_ASIDE * body.stature, body.height(HEIGHTS["sternum_ij"]), 0.02])
+    found["{side}_clavicle_inner"] = body.picker.surface(clavicle, FRONT, trunk)
+    spine = np.array([SCAPULAR_SPINE_ASIDE * body.stature, body.height(HEIGHTS["scapular_spine"]), 0])
+    found["{side}_scapular_spine"] = body.picker.surface(spine, -FRONT, trunk)
 
     limb = body.part("left_shoulder", "left_elbow", "left_wrist")
     upper, fore = _unit(elbow - shoulder), _unit(wrist - elbow)
@@ -173,6 +198,7 @@ def _arm(body: Mannequin) -> dict[str, Landmark]:
     middle = _centred(body, elbow, _unit(upper - fore), limb)
     found["{side}_elbow_lateral"] = body.picker.surface(middle, -medial, limb)
     found["{side}_elbow_medial"] = body.picker.surface(middle, medial, limb)
+    found["{side}_olecranon"] = body.picker.surface(middle, _unit(upper - fore), limb)
 
     radial = body.bones["finger2-1.L"] - body.bones["finger5-1.L"]
     radial = _unit(radial - fore * (fore @ radial))
@@ -189,8 +215,12 @@ def _hand(body: Mannequin) -> dict[str, Landmark]:
     radial = body.bones["finger2-1.L"] - body.bones["finger5-1.L"]
     dorsal = _unit(np.cross(radial, third - wrist))
     palm = body.part("left_wrist", "left_hand")
+
+    def knuckle(finger: int) -> Landmark:
+        return body.picker.surface(body.bones[f"finger{finger}-1.L"], dorsal, palm)
+
     found = {
-        "{side}_hand_meta3": body.picker.surface(third, dorsal, palm),
+        **{f"{{side}}_hand_meta{i}": knuckle(i) for i in (2, 3, 5)},
         "{side}_hand_meta3_palmar": body.picker.surface(third, -dorsal, palm),
     }
     for name, bone in (("index", "finger2-1.L"), ("pinky", "finger5-1.L"), ("thumb", "finger1-2.L")):

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from solver.bench.execute import Run
+from solver.body.model import EMBEDDED
 from solver.pipeline.digest import canonical, digest_of, file_digest
 
 VERSION = 1
@@ -27,6 +28,7 @@ def key_of(run: Run) -> str:
             "motion": run.motion.digest,
             "seed": run.seed,
             "method": run.method,
+            "body": file_digest(EMBEDDED),
             "settings": {name: [type(own).__name__, canonical(own)] for name, own in variant.settings.items()},
             "code": code_digest((*variant.sources, *_GENERATOR)),
         }

@@ -40,6 +40,7 @@ def load_smpl(path: str | Path) -> Body:
         landmark_vertices=np.zeros((0, 1), int),
         landmark_values=np.zeros((0, 1)),
         landmark_joint=np.zeros(0, int),
+        landmark_bone=np.zeros(0, int),
         betas_count=data["shapedirs"].shape[2],
         pose_dirs=data.get("posedirs"),
         name=Path(path).name,
@@ -68,6 +69,7 @@ def _named_like(own: Body, known: Body) -> Body:
         landmark_vertices=vertices.reshape(len(points), -1),
         landmark_values=(share / share.sum(axis=-1, keepdims=True)).reshape(len(points), -1),
         landmark_joint=known.landmark_joint,
+        landmark_bone=known.landmark_bone,
         _torch={},
     )
 

@@ -8,6 +8,7 @@ the shaped body at rest, once; its columns are written in the rest body's axes (
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Literal
 
 import numpy as np
 
@@ -15,6 +16,20 @@ from solver.body.skeleton import INDEX
 
 UPRIGHT = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])
 """The frame of a segment that stands square in the rest pose: X forward, Y up, Z right."""
+
+MODEL_THORAX = {
+    "c7": (-0.074, 0.414),
+    "t8": (-0.097, 0.222),
+    "sternum_ij": (0.026, 0.379),
+    "sternum_px": (0.088, 0.200),
+}
+"""m forward and up in the torso of Rajagopal et al. (2016): spinous processes, jugular notch and end of the sternum,
+read off the bones ``hat_spine`` and ``hat_ribs_scap``, and 10 mm of skin behind, 5 on the notch, 8 on the xiphoid."""
+
+_ARM_FORWARD, _ARM_OUTWARD, _ARM_INWARD_TURN = np.radians([-2.9, -1.5, -7.9])
+"""The humerus' frame in the model of Rajagopal et al. 2016 (whose bone is ``humerus_rv``), seen from the frame that the
+same bone's epicondyles and the model's shoulder and elbow make: turns about Z, X and Y of the right arm. The line
+through the epicondyles points 8 degrees forward of the model's Z axis, the elbow in front of its Y axis."""
 
 SEGMENT_JOINT = {
     "pelvis": "pelvis",
@@ -36,7 +51,13 @@ SEGMENT_JOINT = {
 
 
 def segment_frames(
-    landmarks: Mapping[str, np.ndarray], joints: np.ndarray, *, upright_trunk: bool, ulnar_forearm: bool = False
+    landmarks: Mapping[str, np.ndarray],
+    joints: np.ndarray,
+    *,
+    pelvis: Literal["upright", "spines"],
+    thorax: Literal["model", "isb"],
+    upper_arm: Literal["model", "epicondyles"] = "epicondyles",
+    forearm: Literal["wrist", "ulna"] = "wrist",
 ) -> dict[str, np.ndarray]:
     """Anatomical frame (3, 3) of every segment in the rest body's axes; columns X, Y, Z.
 
@@ -44,12 +65,17 @@ def segment_frames(
     ----------
     landmarks : (3,) m by name, shaped body at rest
     joints : (24, 3) m joint centres, likewise
-    upright_trunk : take pelvis and thorax as they stand in the rest pose; else from iliac spines and from sternum and
-        spine, as ISB says
-    ulnar_forearm : let the forearm's long axis end at the ulnar styloid, as ISB says, not in the middle of the wrist
+    pelvis : as it stands in the rest pose, or in the plane of the iliac spines (ISB)
+    thorax : as OpenSim's model has it on its bones, laid over C7, T8, jugular notch and xiphoid; or along the line
+        between the middles of these (ISB)
+    upper_arm : as OpenSim's model has it, or along the epicondyles (ISB)
+    forearm : its long axis ends in the middle of the wrist, or at the ulnar styloid (ISB)
     """
     at = {name: joints[i] for name, i in INDEX.items()}
-    frames = {"pelvis": UPRIGHT, "thorax": UPRIGHT} if upright_trunk else _trunk(landmarks)
+    frames = {
+        "pelvis": UPRIGHT if pelvis == "upright" else _pelvis(landmarks),
+        "thorax": _model_thorax(landmarks) if thorax == "model" else _thorax(landmarks),
+    }
     for side in ("left", "right"):
 
         def across(lateral: str, medial: str, side: str = side) -> np.ndarray:
@@ -63,23 +89,52 @@ def segment_frames(
         frames[f"{side}_shank"] = _along(at[f"{side}_knee"] - at[f"{side}_ankle"], knee_axis)
         frames[f"{side}_foot"] = _foot(landmarks[f"{side}_toe"] - landmarks[f"{side}_calcaneus"])
         elbow_axis = across("elbow_lateral", "elbow_medial")
-        frames[f"{side}_upper_arm"] = _along(at[f"{side}_shoulder"] - at[f"{side}_elbow"], elbow_axis)
+        arm = _along(at[f"{side}_shoulder"] - at[f"{side}_elbow"], elbow_axis)
+        frames[f"{side}_upper_arm"] = arm @ _model_arm(side) if upper_arm == "model" else arm
         wrist_axis = across("wrist_radius", "wrist_ulna")
-        far = landmarks[f"{side}_wrist_ulna"] if ulnar_forearm else at[f"{side}_wrist"]
+        far = landmarks[f"{side}_wrist_ulna"] if forearm == "ulna" else at[f"{side}_wrist"]
         frames[f"{side}_forearm"] = _along(at[f"{side}_elbow"] - far, wrist_axis)
         frames[f"{side}_hand"] = _along(at[f"{side}_wrist"] - at[f"{side}_hand"], wrist_axis)
     return frames
 
 
-def _trunk(landmarks: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _pelvis(landmarks: Mapping[str, np.ndarray]) -> np.ndarray:
     right = _unit(landmarks["right_asis"] - landmarks["left_asis"])
     front = (landmarks["left_asis"] + landmarks["right_asis"] - landmarks["left_psis"] - landmarks["right_psis"]) / 2
     front = _unit(front - right * (front @ right))
-    pelvis = np.stack([front, np.cross(right, front), right], axis=1)
+    return np.stack([front, np.cross(right, front), right], axis=1)
+
+
+def _thorax(landmarks: Mapping[str, np.ndarray]) -> np.ndarray:
     high = (landmarks["sternum_ij"] + landmarks["c7"]) / 2
     low = (landmarks["sternum_px"] + landmarks["t8"]) / 2
     ahead = landmarks["sternum_ij"] - landmarks["c7"]
-    return {"pelvis": pelvis, "thorax": _along(high - low, np.cross(ahead, high - low))}
+    return _along(high - low, np.cross(ahead, high - low))
+
+
+def _model_thorax(landmarks: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Turned in the body's median plane by what lays the model's four points over the body's best (least squares)."""
+    model = np.array(list(MODEL_THORAX.values()))
+    body = np.stack([landmarks[name] @ UPRIGHT for name in MODEL_THORAX])[:, :2]
+    (forward, up), (x, y) = (model - model.mean(axis=0)).T, (body - body.mean(axis=0)).T
+    angle = np.arctan2((forward * y - up * x).sum(), (forward * x + up * y).sum())
+    return UPRIGHT @ _turn("Z", angle)
+
+
+def _model_arm(side: str) -> np.ndarray:
+    """The model's humerus seen from the frame of the epicondyles; mirrored on the left."""
+    sign = 1 if side == "right" else -1
+    return _turn("Z", _ARM_FORWARD) @ _turn("X", sign * _ARM_OUTWARD) @ _turn("Y", sign * _ARM_INWARD_TURN)
+
+
+def _turn(axis: Literal["X", "Y", "Z"], angle: float) -> np.ndarray:
+    """(3, 3) right-handed rotation about one axis, rad."""
+    place = "XYZ".index(axis)
+    one, two = (place + 1) % 3, (place + 2) % 3
+    matrix = np.eye(3)
+    matrix[[one, two], [one, two]] = np.cos(angle)
+    matrix[two, one], matrix[one, two] = np.sin(angle), -np.sin(angle)
+    return matrix
 
 
 def _along(proximal: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -35,6 +35,7 @@ class Body:
     marker_mask : (V,) True where a marker can sit
     landmark_names : N names; with landmark_vertices, landmark_values (N, K) a mean of vertices, or
         landmark_joint (N,) the joint whose centre it is (-1: the vertices)
+    landmark_bone : (N,) index of the joint whose bone a palpable landmark is a point of; -1 where it is none
     pose_dirs : (V, 3, 207) m pose-dependent correctives of an SMPL file, else None
     betas_count : how many of the S coefficients are the file's own; the rest are bone lengths
     digest : of the file, for provenance
@@ -55,6 +56,7 @@ class Body:
     landmark_vertices: np.ndarray
     landmark_values: np.ndarray
     landmark_joint: np.ndarray
+    landmark_bone: np.ndarray
     betas_count: int
     pose_dirs: np.ndarray | None = None
     name: str = ""
@@ -207,6 +209,7 @@ def _embedded() -> Body:
             "landmark_vertices": data["landmark_vertices"].astype(np.intp),
             "landmark_values": data["landmark_values"].astype(float),
             "landmark_joint": data["landmark_joint"].astype(np.intp),
+            "landmark_bone": data["landmark_bone"].astype(np.intp),
         }
         names = tuple(str(name) for name in data["landmark_names"])
     for array in numbers.values():

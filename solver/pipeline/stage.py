@@ -7,10 +7,12 @@ import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
 from typing import Any, Literal
 
 from solver.errors import Cancelled, InputError
-from solver.pipeline.digest import canonical, result_key
+from solver.pipeline.digest import canonical, file_digest, result_key
 from solver.pipeline.pieces import Pieces
 from solver.pipeline.source import Source, Touched, Watch, changed
 from solver.pipeline.store import Absent, Store
@@ -37,6 +39,7 @@ class Stage:
     run : ``(inputs by name, settings, progress) -> result``; a source arrives as its path (or value)
     result : type of the result, a frozen dataclass or an annotation such as ``Landmarks | None``
     headline : one line about a result
+    shipped : files of the program itself that it reads: another content makes another result
     cost : how long it takes beside the other stages, in any unit; only the progress bar believes it
     """
 
@@ -48,6 +51,18 @@ class Stage:
     result: Any
     headline: Callable[[Any], str] = lambda result: ""
     cost: float = 1.0
+    shipped: tuple[Path, ...] = ()
+
+    def key(self, settings: Any, inputs: Mapping[str, str]) -> str:
+        """Key of its result, from the keys and digests of its inputs."""
+        own = {f"shipped {path.name}": _shipped_digest(path) for path in self.shipped}
+        return result_key(self.name, self.version, settings, {**inputs, **own})
+
+
+@cache
+def _shipped_digest(path: Path) -> str:
+    """What ships does not change while the program runs."""
+    return file_digest(path)
 
 
 @dataclass(frozen=True)
@@ -106,7 +121,7 @@ def stage_keys(graph: Sequence[Stage], sources: Mapping[str, Source], settings: 
             raise ValueError(f"an input that is neither a stage nor a source: {name}")
         stage = stages[name]
         inputs = {i: sources[i].digest if i in sources else keys[i] for i in stage.inputs}
-        keys[name] = result_key(name, stage.version, _settings_of(stage, settings), inputs)
+        keys[name] = stage.key(_settings_of(stage, settings), inputs)
     return keys
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.angles import AngleSettings, JointAngles
+from solver.body.model import EMBEDDED
 from solver.clean.clean import Cleaned
 from solver.markers import Markers
 from solver.neutral import Neutral, NeutralSettings
@@ -95,6 +96,8 @@ def _said_angles(angles: JointAngles) -> str:
 
 FITTED_TO = ("clean", "prior", "landmarks", "sync", "body_file")
 """What every stage of the fit looks at."""
+BODY = (EMBEDDED,)
+"""Read by every stage that sees a body: a user's own, too, takes its landmarks from the embedded one."""
 
 GRAPH = (
     Stage("markers", 1, MarkerSettings, ("marker_file",), inputs.read_markers, Markers, _said_markers, cost=0.5),
@@ -111,8 +114,18 @@ GRAPH = (
         _said_landmarks,
         cost=16,
     ),
-    Stage("prior", 2, PriorSettings, ("prior_file", "landmarks"), inputs.pose_prior, PosePrior, cost=2),
-    Stage("sync", 1, SyncSettings, ("clean", "landmarks", "prior"), inputs.synchronise, Sync, _said_sync, cost=1),
+    Stage("prior", 2, PriorSettings, ("prior_file", "landmarks"), inputs.pose_prior, PosePrior, cost=2, shipped=BODY),
+    Stage(
+        "sync",
+        1,
+        SyncSettings,
+        ("clean", "landmarks", "prior"),
+        inputs.synchronise,
+        Sync,
+        _said_sync,
+        cost=1,
+        shipped=BODY,
+    ),
     Stage("segment", 1, SegmentSettings, ("clean",), fitting.group_markers, Segmentation, said_segmentation, cost=0.3),
     Stage(
         "localize",
@@ -123,6 +136,7 @@ GRAPH = (
         Localization,
         _said_localization,
         cost=2,
+        shipped=BODY,
     ),
     Stage(
         "orient",
@@ -133,6 +147,7 @@ GRAPH = (
         Orientation,
         said_orientation,
         cost=5,
+        shipped=BODY,
     ),
     Stage(
         "fit",
@@ -143,6 +158,7 @@ GRAPH = (
         FittedMotion,
         said_fit,
         cost=2,
+        shipped=BODY,
     ),
     Stage(
         "neutral",
@@ -153,6 +169,7 @@ GRAPH = (
         Neutral,
         said_neutral,
         cost=0.2,
+        shipped=BODY,
     ),
     Stage(
         "angles",
@@ -163,6 +180,7 @@ GRAPH = (
         JointAngles,
         _said_angles,
         cost=0.1,
+        shipped=BODY,
     ),
     Stage(
         "surface",
@@ -173,6 +191,7 @@ GRAPH = (
         SurfaceDistance,
         _said_surface,
         cost=2,
+        shipped=BODY,
     ),
     Stage(
         "check",

@@ -12,7 +12,7 @@ from solver.errors import InputError
 from solver.neural.agnostic_fit import NetworkPoses, NeuralFitSettings
 from solver.pipeline.fitting import scene as scene_of
 from solver.pipeline.stage import Stage
-from solver.pipeline.stages import FITTED_TO, GRAPH, said_fit
+from solver.pipeline.stages import BODY, FITTED_TO, GRAPH, said_fit
 from solver.progress import Progress, part_of
 from solver.solve.results import FittedMotion
 
@@ -115,6 +115,7 @@ _OWN = (
         NetworkPoses,
         said_poses,
         cost=3,
+        shipped=BODY,
     ),
     Stage(
         "fit",
@@ -125,6 +126,7 @@ _OWN = (
         FittedMotion,
         said_fit,
         cost=2,
+        shipped=BODY,
     ),
 )
 

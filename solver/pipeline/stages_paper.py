@@ -9,7 +9,7 @@ from typing import Any
 from solver.pipeline.fitting import group_markers
 from solver.pipeline.fitting import scene as scene_of
 from solver.pipeline.stage import NoSettings, Stage
-from solver.pipeline.stages import FITTED_TO, GRAPH, said_fit, said_orientation, said_segmentation
+from solver.pipeline.stages import BODY, FITTED_TO, GRAPH, said_fit, said_orientation, said_segmentation
 from solver.progress import Progress
 from solver.segment import Segmentation, SegmentSettings
 from solver.solve.paper.results import PaperLocalization, PaperSolve
@@ -93,6 +93,7 @@ _OWN = (
         PaperLocalization,
         _said_part,
         cost=30,
+        shipped=BODY,
     ),
     Stage(
         "solve",
@@ -103,6 +104,7 @@ _OWN = (
         PaperSolve,
         _said_solve,
         cost=200,
+        shipped=BODY,
     ),
     Stage(
         "orient",
@@ -113,6 +115,7 @@ _OWN = (
         Orientation,
         said_orientation,
         cost=2,
+        shipped=BODY,
     ),
     Stage(
         "fit",
@@ -123,6 +126,7 @@ _OWN = (
         FittedMotion,
         said_fit,
         cost=1,
+        shipped=BODY,
     ),
 )
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.body.anatomy import SEGMENT_JOINT, UPRIGHT, segment_frames
+from solver.body.anatomy import MODEL_THORAX, SEGMENT_JOINT, UPRIGHT, segment_frames
 from solver.body.bones import with_bone_lengths
 from solver.body.model import Body
 from solver.body.skeleton import INDEX
 
 ACROSS = np.diag([-1.0, 1, 1])
+ISB = {"pelvis": "spines", "thorax": "isb", "upper_arm": "epicondyles", "forearm": "ulna"}
+OPENSIM = {"pelvis": "upright", "thorax": "model", "upper_arm": "model", "forearm": "wrist"}
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +21,8 @@ def body() -> Body:
 
 
 def frames_of(body: Body, betas: np.ndarray, *, isb: bool) -> dict[str, np.ndarray]:
-    return segment_frames(body.landmarks(betas), body.joints(betas), upright_trunk=not isb, ulnar_forearm=isb)
+    how = ISB if isb else OPENSIM
+    return segment_frames(body.landmarks(betas), body.joints(betas), **how)
 
 
 @pytest.mark.parametrize("isb", [False, True])
@@ -77,7 +80,7 @@ def test_the_trunk_as_isb_defines_it() -> None:
     }
     body = Body.load()
     rest = np.zeros(body.shape_count)
-    frames = segment_frames({**body.landmarks(rest), **points}, body.joints(rest), upright_trunk=False)
+    frames = segment_frames({**body.landmarks(rest), **points}, body.joints(rest), **ISB)
     slope = np.arctan2(0.03, 0.16)
     expected = np.array([[0, 0, -1], [-np.sin(slope), np.cos(slope), 0], [np.cos(slope), np.sin(slope), 0]])
     assert np.abs(frames["pelvis"] - expected).max() < 1e-12, "the pelvis tips forward with the plane of its spines"
@@ -93,3 +96,45 @@ def test_the_forearm_ends_where_asked(body: Body) -> None:
         along = joints[INDEX["right_elbow"]] - end
         found = frames_of(body, betas, isb=isb)["right_forearm"][:, 1]
         assert np.abs(found - along / np.linalg.norm(along)).max() < 1e-12
+
+
+def test_the_upper_arm_of_the_model_is_turned_against_its_epicondyles(body: Body) -> None:
+    """Epicondyles and joints of the model's own right humerus, in the model's frame of it: that frame must come out."""
+    to_rest = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])
+    lateral, medial = np.array([0.0106, -0.2800, 0.0243]), np.array([0.0027, -0.2796, -0.0327])
+    rest = np.zeros(body.shape_count)
+    for side, mirror in (("right", np.eye(3)), ("left", np.diag([-1.0, 1, 1]))):
+        place = mirror @ to_rest
+        joints = body.joints(rest).copy()
+        joints[INDEX[f"{side}_shoulder"]] = 0
+        joints[INDEX[f"{side}_elbow"]] = place @ np.array([0.013144, -0.286273, -0.009595])
+        points = {f"{side}_elbow_lateral": place @ lateral, f"{side}_elbow_medial": place @ medial}
+        frames = segment_frames({**body.landmarks(rest), **points}, joints, **OPENSIM)
+        off = np.degrees(np.arccos((np.trace(UPRIGHT.T @ frames[f"{side}_upper_arm"]) - 1) / 2))
+        assert off < 0.2, f"{side}: {off:.2f} degrees"
+
+
+def test_the_thorax_of_the_model_is_laid_over_its_landmarks(body: Body) -> None:
+    """The model's own points give an upright thorax; tipped forward by 10 degrees and enlarged, one that is."""
+    rest = np.zeros(body.shape_count)
+    for tip in (0.0, 10.0):
+        c, s = np.cos(np.radians(tip)), np.sin(np.radians(tip))
+        points = {
+            name: np.array([0.0, 1.2 * (c * up - s * ahead), 1.2 * (c * ahead + s * up)])
+            for name, (ahead, up) in MODEL_THORAX.items()
+        }
+        frames = segment_frames({**body.landmarks(rest), **points}, body.joints(rest), **OPENSIM)
+        expected = UPRIGHT @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+        assert np.abs(frames["thorax"] - expected).max() < 1e-12
+
+
+def test_the_thorax_of_the_model_does_not_depend_on_build(body: Body) -> None:
+    """Fat lies over the xiphoid and the spine: the turn must not follow it by more than some degrees."""
+    rng = np.random.default_rng(3)
+    tilts = []
+    for _ in range(20):
+        betas = np.concatenate([rng.normal(0, 1, body.betas_count), np.zeros(body.shape_count - body.betas_count)])
+        thorax = frames_of(body, betas, isb=False)["thorax"]
+        tilts.append(np.degrees(np.arctan2(thorax[2, 1], thorax[1, 1])))
+    assert np.std(tilts) < 2
+    assert 5 < np.mean(tilts) < 15, "at rest the body's thorax stands as the model's does when it leans forward"

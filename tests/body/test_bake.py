@@ -78,6 +78,16 @@ def test_a_hole_and_a_doubled_face_are_noticed():
     assert len(coarse.bad_edges(np.vstack([faces, faces[:1]]))) > 0
 
 
+def test_a_pinch_is_noticed():
+    """Two spheres that share a vertex have no bad edge, and are no sphere."""
+    faces = sphere(1)[1]
+    count = faces.max() + 1
+    other = np.where(faces == 0, 3, faces + count)  # its first vertex is the fourth of the first sphere
+    assert len(coarse.pinched_vertices(faces)) == 0
+    assert len(coarse.bad_edges(np.vstack([faces, other]))) == 0
+    assert coarse.pinched_vertices(np.vstack([faces, other])).tolist() == [3]
+
+
 def test_areas_add_up():
     vertices, faces = sphere()
     assert coarse.vertex_areas(vertices, faces).sum() == pytest.approx(4 * np.pi, rel=0.01)
@@ -218,3 +228,12 @@ def test_loose_parts_are_left_out_and_twins_found():
 def test_normals_point_outwards():
     vertices, faces = sphere(3)
     np.testing.assert_allclose(markers.vertex_normals(vertices, faces), vertices, atol=0.02)
+
+
+def test_the_elbow_lies_before_and_below_its_epicondyles():
+    """Arms hanging, palms forward, both sides: forward, down and medial by the shares of Rajagopal's humerus."""
+    for side in (1.0, -1.0):
+        shoulder = np.array([[side * 0.2, 1.4, 0.0]])
+        middle = shoulder + np.array([[0, -0.28, 0]])
+        centre = joint_centres.elbow_centre(shoulder, middle, np.array([[side * 0.06, 0.01, 0]]), side)
+        np.testing.assert_allclose(centre - middle, [[-side * 0.00532, -0.00644, 0.00644]], atol=1e-9)

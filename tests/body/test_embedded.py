@@ -85,7 +85,9 @@ def test_weights_sum_to_one_and_change_smoothly(body: Body):
     assert body.weights_value.min() >= 0
     edges = body.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     step = np.abs(body.weights[edges[:, 0]] - body.weights[edges[:, 1]]).max(axis=1)
-    assert np.percentile(step, 99.9) < 0.6, f"weights jump by {step.max():.2f} along an edge"
+    length = np.linalg.norm(body.template[edges[:, 0]] - body.template[edges[:, 1]], axis=1)
+    slope = np.percentile(step / np.maximum(length, 0.008), 99.9)
+    assert slope < 70, f"skin passes from one bone to another within {1000 / slope:.0f} mm"
 
 
 def test_left_mirrors_right_in_every_shape(body: Body, shapes: np.ndarray):
@@ -149,8 +151,6 @@ def test_hips_agree_with_another_regression_than_the_one_used(body: Body):
     ("joint", "one", "other"),
     [
         ("knee", "knee_lateral", "knee_medial"),
-        ("ankle", "ankle_lateral", "ankle_medial"),
-        ("elbow", "elbow_lateral", "elbow_medial"),
         ("wrist", "wrist_radius", "wrist_ulna"),
     ],
 )
@@ -162,6 +162,38 @@ def test_joints_lie_midway_between_their_landmarks_in_every_shape(
         middle = (marks[f"left_{one}"] + marks[f"left_{other}"]) / 2
         error = np.linalg.norm(middle - body.joints(betas)[INDEX[f"left_{joint}"]])
         assert error < 0.006, f"{error * 1000:.1f} mm"
+
+
+def test_the_ankle_lies_below_the_middle_of_the_malleoli_in_every_shape(body: Body, shapes: np.ndarray):
+    """By 10 mm; its height over stature is 0.039 in Winter's table, whose subjects are thinner under the heel."""
+    for betas in (NOTHING, *shapes):
+        marks, ankle = body.landmarks(betas), body.joints(betas)[INDEX["left_ankle"]]
+        middle = (marks["left_ankle_lateral"] + marks["left_ankle_medial"]) / 2
+        assert 0.007 < (middle - ankle)[1] < 0.013
+        np.testing.assert_allclose((middle - ankle)[[0, 2]], 0, atol=0.004)
+        height = (ankle[1] - body.surface(betas)[:, 1].min()) / stature(body, betas)
+        assert height == pytest.approx(0.040, abs=0.008)
+
+
+def test_the_elbow_lies_before_and_below_the_epicondyles_in_every_shape(body: Body, shapes: np.ndarray):
+    """In the T-pose, palms down: down the arm is outward, its front is forward, and medial is down."""
+    for betas in (NOTHING, *shapes):
+        marks, joints = body.landmarks(betas), body.joints(betas)
+        middle = (marks["left_elbow_lateral"] + marks["left_elbow_medial"]) / 2
+        off = joints[INDEX["left_elbow"]] - middle
+        length = np.linalg.norm(joints[INDEX["left_elbow"]] - joints[INDEX["left_shoulder"]])
+        np.testing.assert_allclose(off / length, [0.023, -0.019, 0.023], atol=0.012)
+
+
+def test_the_shoulder_lies_under_the_edge_of_the_acromion(body: Body):
+    """Rajagopal's model: 3 mm lateral of the acromion's edge, 33 mm below its bone; de Leva: 35 mm below the skin.
+
+    With the arms down: the T-pose lifts the skin beside the acromion, not the acromion.
+    """
+    marks, shoulder = body.landmarks(NOTHING), body.joints(NOTHING)[INDEX["left_shoulder"]]
+    off = shoulder - marks["left_acromion"]
+    assert 0 < off[0] < 0.012
+    assert 0.030 < -off[1] < 0.045
 
 
 def test_the_rest_pose_is_a_t_with_straight_limbs(body: Body, shapes: np.ndarray):

@@ -19,6 +19,7 @@ from solver.io import load_markers
 from solver.io.export_c3d import write_c3d
 from solver.outputs import write_formats
 from solver.pipeline import solve_session
+from solver.pipeline import stage as stage_module
 from solver.pipeline.digest import file_digest
 from solver.pipeline.request import SolveRequest
 from solver.pipeline.run import run_stages
@@ -29,6 +30,8 @@ from solver.pipeline.solve import session_of
 from solver.pipeline.source import Source
 from solver.pipeline.stage import Event, stage_keys
 from solver.pipeline.stages import GRAPH, SOURCES
+from solver.pipeline.stages_neural import GRAPH_NEURAL
+from solver.pipeline.stages_paper import GRAPH_PAPER
 from solver.pipeline.worker import Job
 from solver.posed import body_of
 from solver.progress import silent
@@ -118,6 +121,22 @@ def test_an_input_changes_what_depends_on_it(source: str, changed: set[str]) -> 
     before = stage_keys(GRAPH, sources, {})
     after = stage_keys(GRAPH, {**sources, source: Source(None, "another")}, {})
     assert {key for key in before if before[key] != after[key]} == changed
+
+
+def test_another_embedded_body_makes_everything_that_sees_it_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fit on the old body means nothing on the new one: not its betas, nor its vertices, nor its angles."""
+    sources = {name: Source.file(None) for name in SOURCES}
+    for graph, more in (
+        (GRAPH, set()),
+        (GRAPH_PAPER, {"solve"}),
+        (GRAPH_NEURAL, {"network"}),
+    ):
+        before = stage_keys(graph, sources, {})
+        with monkeypatch.context() as patch:
+            patch.setattr(stage_module, "_shipped_digest", lambda path: f"another {path.name}")
+            after = stage_keys(graph, sources, {})
+        changed = {key for key in before if before[key] != after[key]}
+        assert changed == {"prior", "sync"} | FITTED | more
 
 
 def test_the_second_time_nothing_is_computed_nor_written(mine: Path) -> None:

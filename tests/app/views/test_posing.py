@@ -9,7 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 from app.views.bodies import BodyTrack, keyframes_of, of_candidate, of_hypothesis, of_iteration, of_motion
-from app.views.posing import BONE_EDGES, Pose, mesh_of, pose_at
+from app.views.posing import BONE_EDGES, Pose, bones_of, mesh_of, pose_at
+from solver.body.bone_meshes import bone_meshes
 from solver.body.model import Body
 from solver.body.skeleton import INDEX, JOINTS
 from solver.prior import PosePrior
@@ -32,6 +33,17 @@ def test_a_frame_is_where_the_solver_poses_it(made: Made, detail: str) -> None:
         assert np.abs(track.joints(float(motion.time[frame])) - joints[0]).max() < 1e-12
     faces = track.faces(detail)  # type: ignore[arg-type]
     assert faces.min() == 0 and faces.max() == len(found) - 1
+
+
+def test_bones_are_where_the_solver_poses_them(made: Made) -> None:
+    motion, track = made.motion, of_motion(made.body, made.motion)
+    wanted = bone_meshes().posed(made.body, motion.rotations[[17]], motion.betas, motion.trans[[17]])[0]
+    found = track.bones.at(track.pose(float(motion.time[17])))
+    assert np.abs(found - wanted).max() < 2e-6
+    fewer = bones_of(made.body, motion.betas[:6]).at(track.pose(0.0))
+    rest = np.pad(motion.betas[:6], (0, len(motion.betas) - 6))
+    wanted = bone_meshes().posed(made.body, motion.rotations[[0]], rest, motion.trans[[0]])[0]
+    assert np.abs(fewer - wanted).max() < 2e-6, "coefficients that are not given are zero"
 
 
 def test_far_from_the_origin_single_precision_still_suffices(made: Made) -> None:

@@ -76,6 +76,22 @@ def test_the_bar_sets_what_the_scene_shows_and_is_remembered(
     assert again.scene_bar.colour.currentData() == "residual" and again.scene_bar.opacity.value() == 0
 
 
+def test_the_bones_lie_in_the_body_and_can_be_hidden(window: MainWindow, spin: Callable[..., None]) -> None:
+    display = window.bench.display
+    assert display.layers["bones"], "they are shown at first"
+    with_bones = picture(window.scene)
+    window.table.trigger("layer.bones")
+    spin()
+    assert not display.layers["bones"]
+    assert changed(with_bones, picture(window.scene)) > 0.005
+    display.set(opacity=1.0)
+    spin()
+    covered = picture(window.scene)
+    window.table.trigger("layer.bones")
+    spin()
+    assert changed(covered, picture(window.scene)) < 0.01, "a body that is not see-through hides them"
+
+
 def test_every_control_of_the_bar_is_reached_by_keys_and_says_what_it_is(window: MainWindow) -> None:
     bar = window.scene_bar
     for part in (bar.tool, bar.colour, bar.layers, bar.opacity, bar.trail, bar.views, bar.follow):
