@@ -1,10 +1,10 @@
-"""``python -m app`` is the same as ``markerscope``."""
+"""``python -m markerscope.app`` is the same as ``markerscope``."""
 
 from __future__ import annotations
 
 import sys
 
-from app.cli import main
+from markerscope.app.cli.main import main
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from solver.bench.clean import run_clean_bench
+from markerscope.solver.bench.clean import run_clean_bench
 
 
 def main() -> None:

@@ -15,8 +15,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from solver.errors import InputError
-from solver.io.atomic import write_text_atomic
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.atomic import write_text_atomic
 
 ROOT = Path(__file__).parents[1]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs" / "benchmarks").glob("*.md")))

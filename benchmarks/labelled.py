@@ -16,15 +16,15 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.angles import world_rotations
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.body.skeleton import INDEX
-from solver.errors import InputError
-from solver.io import load_markers
-from solver.markers import Markers
-from solver.rotations import log_so3
-from solver.solve.labelled.solve import solve_labelled
+from markerscope.solver.angles.angles import world_rotations
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.rotations import log_so3
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.fit.labelled.solve import solve_labelled
+from markerscope.solver.io import load_markers
 
 TRIALS = ("fullbody/labval_walk.trc", "fullbody/labval_dropjump_male.trc")
 SIDES = {"left": "L", "right": "r"}

@@ -3,9 +3,9 @@
     python -m benchmarks.networks MOTIONS OUT [--layout full_body] [--minutes 11] [--size compact|paper|holden]
                                               [--start OUT/net.safetensors]
 
-MOTIONS is a folder of BVH and AMC files; kinds of action named in ``solver.bench.neural.UNSEEN`` are held out, and the
-last 15 % of every other motion. OUT gets ``net.safetensors`` and ``net.json``. ``--start`` goes on with weights.
-Prints a Markdown table: 60 spans of 32 frames, on bodies outside of the shape basis that were not learnt from.
+MOTIONS is a folder of BVH and AMC files; kinds of action named in ``markerscope.solver.bench.neural.UNSEEN`` are held
+out, and the last 15 % of every other motion. OUT gets ``net.safetensors`` and ``net.json``. ``--start`` goes on with
+weights. Prints a Markdown table: 60 spans of 32 frames, on bodies outside of the shape basis that were not learnt from.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from solver.bench.neural import held_out
-from solver.body.model import Body
-from solver.body.skeleton import INDEX
-from solver.io.atomic import make_folder, write_text_atomic
-from solver.neural.build import Choice
-from solver.neural.examples import Sampler, generator
-from solver.neural.heterogeneous import COMPACT, Sizes
-from solver.neural.layout import named_layout
-from solver.neural.library import RATE, by_kind, load_library, procedural_clips
-from solver.neural.metrics import angles_between, jpe
-from solver.neural.named import Solver, load_solver, save_solver, solve, train_solver
-from solver.neural.solving import samplers
-from solver.neural.train import TrainSettings
-from solver.neural.weights import Card
+from markerscope.solver.bench.neural import held_out
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.io.atomic import make_folder, write_text_atomic
+from markerscope.solver.neural.layout import named_layout
+from markerscope.solver.neural.metrics import angles_between, jpe
+from markerscope.solver.neural.per_layout.build import Choice
+from markerscope.solver.neural.per_layout.heterogeneous import COMPACT, Sizes
+from markerscope.solver.neural.per_layout.named import Solver, load_solver, save_solver, solve, train_solver
+from markerscope.solver.neural.per_layout.solving import samplers
+from markerscope.solver.neural.training.examples import Sampler, generator
+from markerscope.solver.neural.training.library import RATE, by_kind, load_library, procedural_clips
+from markerscope.solver.neural.training.train import TrainSettings
+from markerscope.solver.neural.weights import Card
 
 PLACEMENTS_MM = (0.0, 2.0, 5.0)
 CHOICES = {"compact": Choice(sizes=COMPACT, batch=96), "paper": Choice(sizes=Sizes()), "holden": Choice(kind="holden")}

@@ -22,10 +22,10 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 import numpy as np
 from PySide6.QtWidgets import QApplication
 
-from widgets import palette, theme
-from widgets.gallery_scene import coarse_body, made_up_body, made_up_markers
-from widgets.scene import Camera, Scene3D
-from widgets.video import VideoView
+from markerscope.widgets import palette, theme
+from markerscope.widgets.gallery.scene import coarse_body, made_up_body, made_up_markers
+from markerscope.widgets.scene import Camera, Scene3D
+from markerscope.widgets.video import VideoView
 
 WARM_UP = 20
 

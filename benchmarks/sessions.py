@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from app.models.imports import new_session
 from benchmarks.views import made_up
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.io.export_c3d import write_c3d
-from solver.markers import Markers
-from solver.pipeline.methods import graph_of
-from solver.pipeline.run import keys_of, run_stages
-from solver.pipeline.session import InputFile, Session, load_session, save_session
-from solver.solve.results import FittedMotion
+from markerscope.app.models.imports import new_session
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.fit.results import FittedMotion
+from markerscope.solver.io.export_c3d import write_c3d
+from markerscope.solver.pipeline.methods import graph_of
+from markerscope.solver.pipeline.run import keys_of, run_stages
+from markerscope.solver.pipeline.session import InputFile, Session, load_session, save_session
 
 MARKERS = 50
 VIDEO_SIZE = 1280, 720

@@ -18,14 +18,14 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.body.skeleton import INDEX, JOINTS
-from solver.io import load_markers
-from solver.io.export_trc import write_trc
-from solver.io.mot import read_mot
-from solver.markers import Markers, lab_rotation
-from solver.pipeline import solve_session
-from solver.pipeline.request import SolveRequest
-from solver.progress import silent
+from markerscope.solver.commands import solve_session
+from markerscope.solver.core.markers import Markers, lab_rotation
+from markerscope.solver.core.progress import silent
+from markerscope.solver.core.request import SolveRequest
+from markerscope.solver.core.skeleton import INDEX, JOINTS
+from markerscope.solver.io import load_markers
+from markerscope.solver.io.export_trc import write_trc
+from markerscope.solver.io.mot import read_mot
 
 PARTS = {
     "whole_body": None,

@@ -6,7 +6,7 @@ DATA is the folder of real recordings. A pair is a stretch of video landmarks an
 markers fixed to the bones of the sit-to-stand (whose offset is what most pairs say); recorded motions (BVH) seen by a
 made-up camera through the trembling of a pose network; and, a seventh of the time, two different trials, for which
 every offset is wrong. Lengths, limbs, numbers of markers and gaps vary. Prints the error, a table of confidence against
-truth, and a logistic fit to compare with the one in ``solver.sync``.
+truth, and a logistic fit to compare with the one in ``markerscope.solver.sync.offset``.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from solver.io.markers_in import load_markers
-from solver.markers import Markers
-from solver.sync import find_offset
-from solver.video.blazepose import track_pose
-from solver.video.landmarks import LANDMARKS, Landmarks
+from markerscope.solver.core.landmarks import LANDMARKS, Landmarks
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.io.markers_in import load_markers
+from markerscope.solver.sync.offset import find_offset
+from markerscope.solver.video.blazepose import track_pose
 
 RIGHT = 0.05  # s
 SQUAT_OFFSET, RISE_OFFSET = -0.010, 0.064  # s

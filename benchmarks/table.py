@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.bench.machine import machine
+from markerscope.solver.bench.machine import machine
 
 
 def head() -> None:

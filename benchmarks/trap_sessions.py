@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.bench.motions import MotionSource, find_motions, read_source
-from solver.body.skeleton import INDEX, mirror_index
-from solver.markers import Markers
-from solver.prior import PosePrior
-from solver.rotations import exp_so3
-from solver.synth.session import SynthSession, synthesise
-from solver.synth.settings import SynthSettings
+from markerscope.solver.bench.motions import MotionSource, find_motions, read_source
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX, mirror_index
+from markerscope.solver.synth.session import SynthSession, synthesise
+from markerscope.solver.synth.settings import SynthSettings
 
 FRAMES = 300
 _ACROSS = np.diag([-1.0, 1, 1])
@@ -183,7 +183,7 @@ def cluster(number: int, seed: int, sources: tuple[MotionSource, ...]) -> Trial:
     session = drawn(source, seed + number)
     joint = INDEX[("left_hip", "right_knee", "left_shoulder", "right_hip", "left_knee")[number % 5]]
     truth = session.truth
-    from solver.angles import world_rotations
+    from markerscope.solver.angles.angles import world_rotations
 
     turns = world_rotations(truth.motion.rotations)[:, joint]
     on = np.array([0.0, -0.2, 0.05]) + rng.uniform(-0.05, 0.05, (4 + number % 5, 3))

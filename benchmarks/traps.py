@@ -20,15 +20,15 @@ from typing import Any
 import numpy as np
 
 from benchmarks.trap_sessions import TRAPS, Trial, movements, sound
-from solver.bench.measure import RIGHT_HEADING_DEG, heading_error_deg, near_bones
-from solver.bench.methods import Given, run_stages
-from solver.errors import InputError
-from solver.pipeline.stages import GRAPH
-from solver.progress import silent
-from solver.solve.doubts.agreement import agreement
-from solver.solve.doubts.doubt import CAP
-from solver.solve.doubts.turn import camera_turn
-from solver.solve.observe import on_clock
+from markerscope.solver.bench.measure import RIGHT_HEADING_DEG, heading_error_deg, near_bones
+from markerscope.solver.bench.methods import Given, run_stages
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.progress import silent
+from markerscope.solver.fit.doubts.agreement import agreement
+from markerscope.solver.fit.doubts.doubt import CAP
+from markerscope.solver.fit.doubts.turn import camera_turn
+from markerscope.solver.fit.observe import on_clock
+from markerscope.solver.pipeline.stages import GRAPH
 
 _RIGHT_BONES = 0.8
 

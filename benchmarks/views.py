@@ -17,23 +17,24 @@ from typing import Any
 
 import numpy as np
 
-from app.views import bodies, scene, video
-from app.views.affinity import affinity_picture, recut
-from app.views.markers import marker_table
-from app.views.timelines import offset_row, overview, presence_row, residual_row
-from app.views.tracks import tracks_of
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.markers import Markers
-from solver.pipeline.methods import graph_of
-from solver.pipeline.session import load_session
-from solver.pipeline.stage import stage_keys
-from solver.pipeline.stages import SOURCES
-from solver.prior import PosePrior
-from solver.rotations import exp_so3
-from solver.segment import SegmentSettings, segment
-from solver.solve.results import CameraResult, FittedMotion
-from solver.sync import Sync
+from markerscope.app.views import bodies, scene, video
+from markerscope.app.views.affinity import affinity_picture, recut
+from markerscope.app.views.markers import marker_table
+from markerscope.app.views.timelines import offset_row, overview, presence_row, residual_row
+from markerscope.app.views.tracks import tracks_of
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.clustering.segment import SegmentSettings, segment
+from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.fit.results import FittedMotion
+from markerscope.solver.pipeline.methods import graph_of
+from markerscope.solver.pipeline.session import load_session
+from markerscope.solver.pipeline.stage import stage_keys
+from markerscope.solver.pipeline.stages import SOURCES
+from markerscope.solver.sync.offset import Sync
 
 Row = tuple[str, *tuple[float, ...]]
 RATE = 100.0

@@ -19,7 +19,7 @@ def main() -> None:
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     from PySide6.QtWidgets import QApplication
 
-    from widgets import theme
+    from markerscope.widgets import theme
 
     app = QApplication([])
     theme.apply(app, "light")
@@ -42,9 +42,9 @@ def report(name: str, step: Callable[[int], None], times: int, app: object) -> N
 
 
 def timelines(app: object) -> list:
-    from widgets import palette
-    from widgets.plots.rows import Curve, CurveRow, PresenceRow
-    from widgets.plots.timelines import Timelines
+    from markerscope.widgets import palette
+    from markerscope.widgets.plots.rows import Curve, CurveRow, PresenceRow
+    from markerscope.widgets.plots.timelines import Timelines
 
     rng = np.random.default_rng(0)
     clock = np.arange(FRAMES) / RATE
@@ -97,9 +97,9 @@ def affinity(app: object) -> list:
     from PySide6.QtTest import QTest
     from scipy.cluster.hierarchy import fcluster
 
-    from widgets import palette
-    from widgets.gallery_plots import rigid_groups
-    from widgets.plots.affinity import AffinityView
+    from markerscope.widgets import palette
+    from markerscope.widgets.gallery.plots import rigid_groups
+    from markerscope.widgets.plots.affinity import AffinityView
 
     matrix, tree, order = rigid_groups(100, 16)
     view = AffinityView()
@@ -127,7 +127,7 @@ def affinity(app: object) -> list:
 
 
 def angles(app: object) -> list:
-    from widgets.gallery_plots import curves
+    from markerscope.widgets.gallery.plots import curves
 
     view = curves()
     view.resize(1100, 500)
@@ -139,8 +139,8 @@ def angles(app: object) -> list:
 def table(app: object) -> list:
     from PySide6.QtCore import Qt
 
-    from widgets.gallery_tables import marker_rows
-    from widgets.tables.markers import MarkerTable
+    from markerscope.widgets.gallery.tables import marker_rows
+    from markerscope.widgets.tables.markers import MarkerTable
 
     view = MarkerTable()
     view.resize(900, 400)

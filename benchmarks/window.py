@@ -60,10 +60,10 @@ def show_and_leave(since: float) -> None:
     """In a process of its own: open the empty window, and say how long that took from before Python started."""
     from PySide6.QtWidgets import QApplication
 
-    from app.models.home import Home
-    from app.models.workbench import Workbench
-    from app.window.main import MainWindow
-    from widgets import theme
+    from markerscope.app.models.home import Home
+    from markerscope.app.models.workbench import Workbench
+    from markerscope.app.window.main import MainWindow
+    from markerscope.widgets import theme
 
     app = QApplication([])
     theme.apply(app, "light")
@@ -91,10 +91,10 @@ def window_on(place: Path) -> Iterator[tuple[Any, Spin]]:
     """A window, and a function that lets it live until something is so."""
     from PySide6.QtWidgets import QApplication
 
-    from app.models.home import Home
-    from app.models.workbench import Workbench
-    from app.window.main import MainWindow
-    from widgets import theme
+    from markerscope.app.models.home import Home
+    from markerscope.app.models.workbench import Workbench
+    from markerscope.app.window.main import MainWindow
+    from markerscope.widgets import theme
 
     app = QApplication.instance() or QApplication([])
     assert isinstance(app, QApplication)
@@ -203,7 +203,7 @@ def stalls(window: Any, spin: Spin) -> None:
     """The longest that the event loop was away while stages run, and what is drawn meanwhile."""
     from PySide6.QtCore import QTimer
 
-    from app.models import edits
+    from markerscope.app.models import edits
 
     document = window.bench.document
     seed = document.session.run.seed + 1
@@ -236,8 +236,8 @@ def stalls(window: Any, spin: Spin) -> None:
 
 def long_recording(window: Any, spin: Spin, place: Path) -> None:
     """Ten minutes at 100 Hz with 60 markers: opened until all is drawn, then stepped."""
-    from app.models.imports import new_session
     from benchmarks.sessions import long_markers
+    from markerscope.app.models.imports import new_session
 
     path = long_markers(place / "long.c3d")
 
@@ -261,9 +261,9 @@ def long_recording(window: Any, spin: Spin, place: Path) -> None:
 
 def dragging(window: Any, spin: Spin, place: Path) -> None:
     """The cut of a tree of 100 markers dragged in the window, until scene and matrix are drawn."""
-    from app.cli_commands import DEMO_VIDEO
-    from app.models.imports import new_session
     from benchmarks.sessions import many_markers
+    from markerscope.app.models.demo import DEMO_VIDEO
+    from markerscope.app.models.imports import new_session
 
     window.bench.document.new(**new_session(many_markers(place / "many.c3d"), video=DEMO_VIDEO))
     spin(lambda: window.bench.clock.timing.frames == 600 and window.shown.tracks is not None)

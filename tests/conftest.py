@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import settings
 
-from solver.video.landmarks import Landmarks
+from markerscope.solver.core.landmarks import Landmarks
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
@@ -32,7 +32,7 @@ def shared_data() -> Path:
 @pytest.fixture(scope="session")
 def squat_landmarks(shared_data: Path) -> Landmarks:
     """Landmarks of the real squat video, ten a second, tracked once a test run."""
-    from solver.video.blazepose import track_pose
+    from markerscope.solver.video.blazepose import track_pose
 
     return track_pose(shared_data / "squat_video" / "video.mp4", rate=10)
 
@@ -45,7 +45,7 @@ def qapp() -> QApplication:
         os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
     from PySide6.QtWidgets import QApplication
 
-    from widgets import theme
+    from markerscope.widgets import theme
 
     app = QApplication.instance() or QApplication([])
     assert isinstance(app, QApplication)

@@ -9,22 +9,22 @@ from typing import Any
 
 import numpy as np
 
-from solver.io.export_c3d import write_c3d
-from solver.io.export_smpl import write_smpl_npz
-from solver.io.export_trc import write_trc
-from solver.markers import Markers, UpAxis, lab_rotation
-from solver.pipeline.inputs import LandmarkSettings
-from solver.pipeline.request import SolveRequest
-from solver.pipeline.session import Session, save_session
-from solver.pipeline.solve import session_of
-from solver.pipeline.source import Source
-from solver.pipeline.stage import stage_keys
-from solver.pipeline.stages import GRAPH, SOURCES
-from solver.rotations import exp_so3, log_so3
-from solver.solve.kinematics import forward, place_points
-from solver.video.landmarks import LANDMARKS, Landmarks
-from solver.video.lift import landmark_points
-from tests.solve.conftest import Scene
+from markerscope.solver.commands.solve import session_of
+from markerscope.solver.core.landmarks import LANDMARKS, Landmarks
+from markerscope.solver.core.markers import Markers, UpAxis, lab_rotation
+from markerscope.solver.core.request import SolveRequest
+from markerscope.solver.core.rotations import exp_so3, log_so3
+from markerscope.solver.fit.kinematics import forward, place_points
+from markerscope.solver.fit.lift import landmark_points
+from markerscope.solver.io.export_c3d import write_c3d
+from markerscope.solver.io.export_smpl import write_smpl_npz
+from markerscope.solver.io.export_trc import write_trc
+from markerscope.solver.pipeline.inputs import LandmarkSettings
+from markerscope.solver.pipeline.session import Session, save_session
+from markerscope.solver.pipeline.source import Source
+from markerscope.solver.pipeline.stage import stage_keys
+from markerscope.solver.pipeline.stages import GRAPH, SOURCES
+from tests.fit.conftest import Scene
 
 QUICK: Mapping[str, Mapping[str, Any]] = {
     "localize": {"yaws": 8, "few": 6, "many": 12, "keep": 6},

@@ -11,11 +11,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from solver.angles import AngleSettings, JointAngles, _columns, conventions, evidence, joint_angles, read_angles
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS, mirror_index
-from solver.io.export_angles import angles_long_csv, write_angles
-from solver.markers import lab_rotation
+from markerscope.solver.angles.angles import (
+    AngleSettings,
+    JointAngles,
+    _columns,
+    conventions,
+    evidence,
+    joint_angles,
+    read_angles,
+)
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.markers import lab_rotation
+from markerscope.solver.core.skeleton import INDEX, JOINTS, mirror_index
+from markerscope.solver.io.export_angles import angles_long_csv, write_angles
 
 CONVENTIONS = ("opensim", "gait2392", "isb", "visual3d", "plugin-gait")
 TO_LAB = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])

@@ -18,18 +18,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli import main
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.io import load_markers
-from solver.io.export_c3d import write_c3d
-from solver.io.export_csv import write_markers_csv
-from solver.io.export_trc import write_trc
-from solver.markers import Markers
-from solver.pipeline.request import SolveRequest
-from solver.pipeline.session import save_session
-from solver.pipeline.solve import session_of
-from tests.solve.conftest import simulate
+from markerscope.app.cli.main import main
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.commands.solve import session_of
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.request import SolveRequest
+from markerscope.solver.io import load_markers
+from markerscope.solver.io.export_c3d import write_c3d
+from markerscope.solver.io.export_csv import write_markers_csv
+from markerscope.solver.io.export_trc import write_trc
+from markerscope.solver.pipeline.session import save_session
+from tests.fit.conftest import simulate
 from tests.synthetic import Recording, know, record, watched
 
 TINY = {"localize": {"yaws": 6, "few": 4, "many": 6, "keep": 3}, "orient": {"refine": 1}}
@@ -407,7 +407,7 @@ def test_a_disk_that_is_full(shell: Shell, limit: int, place: str) -> None:
         code = textwrap.dedent(
             f"""
             import sys
-            from app.cli import main
+            from markerscope.app.cli.main import main
             {limited}
             sys.exit(main({words!r}))
             """
@@ -422,7 +422,7 @@ def test_a_disk_that_is_full(shell: Shell, limit: int, place: str) -> None:
 
 def test_as_a_program_of_its_own(shell: Shell) -> None:
     path = shell.file("trial.c3d", GARBAGE)
-    words = [sys.executable, "-m", "app", "solve", path, "--prior", shell.good.prior, "--out", shell.out]
+    words = [sys.executable, "-m", "markerscope.app", "solve", path, "--prior", shell.good.prior, "--out", shell.out]
     done = subprocess.run(list(map(str, words)), cwd=Path(__file__).parents[1], capture_output=True, text=True)
     assert done.returncode == 2
     assert done.stdout == "" and "Traceback" not in done.stderr

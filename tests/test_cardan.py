@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from solver.cardan import SINGULAR_DEG, TURNS, about_axes, cardan
+from markerscope.solver.angles.cardan import SINGULAR_DEG, TURNS, about_axes, cardan
 
 ANKLE = np.array([[-0.105014, -0.174022, 0.979126], [0.787180, 0.604747, -0.120949]])
 

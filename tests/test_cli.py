@@ -16,16 +16,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import cli_commands
-from app.cli import COMMANDS, main
-from app.cli_commands import Services
-from app.cli_output import ProgressBar, json_line
-from solver import __version__
-from solver.datasets.request import DatasetRequest, Options
-from solver.errors import Cancelled, InputError, MarkerscopeError
-from solver.pipeline import output
-from solver.pipeline.request import EvaluateRequest, Outcome, SolveOutcome, SolveRequest
-from solver.progress import Progress
+from markerscope.app.cli import commands as cli_commands
+from markerscope.app.cli.commands import Services
+from markerscope.app.cli.main import COMMANDS, main
+from markerscope.app.cli.output import ProgressBar, json_line
+from markerscope.solver import __version__
+from markerscope.solver.core.errors import Cancelled, InputError, MarkerscopeError
+from markerscope.solver.core.progress import Progress
+from markerscope.solver.core.request import EvaluateRequest, Outcome, SolveOutcome, SolveRequest
+from markerscope.solver.datasets.request import DatasetRequest, Options
+from markerscope.solver.io import output_folder as output
 
 
 class Fake:
@@ -187,7 +187,7 @@ def test_demo_stays_in_the_terminal_where_there_is_no_display(tmp_path: Path) ->
 def test_a_window_without_a_display_is_one_sentence(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("app.window.start.sys.platform", "linux")
+    monkeypatch.setattr("markerscope.app.window.start.sys.platform", "linux")
     assert main([]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "there is no display" in said and "demo --headless" in said
@@ -316,7 +316,7 @@ def test_the_manual_describes_exactly_the_options_there_are(capsys) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="signals are sent otherwise elsewhere")
 def test_control_c_ends_a_real_run(markers: Path, tmp_path: Path) -> None:
     code = (
-        "import signal, sys, time; from app.cli import main; from app.cli_commands import Services\n"
+        "import signal, sys, time; from markerscope.app.cli.main import main; from markerscope.app.cli.commands import Services\n"
         # a shell's background jobs ignore the signal, and hand that down
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "def solve(request, progress): print('ready', flush=True); time.sleep(60)\n"
@@ -337,8 +337,8 @@ def test_control_c_ends_a_real_run(markers: Path, tmp_path: Path) -> None:
 def test_a_reader_that_leaves_ends_the_command_without_a_word(markers: Path) -> None:
     root = Path(__file__).parents[1]
     code = (
-        "import sys; from app.cli import main; from app.cli_commands import Services\n"
-        "from solver.pipeline.request import Outcome\n"
+        "import sys; from markerscope.app.cli.main import main; from markerscope.app.cli.commands import Services\n"
+        "from markerscope.solver.core.request import Outcome\n"
         "services = Services(evaluate=lambda request, progress: Outcome(summary={}, lines=('MPJPE 12 mm.',)))\n"
         f"sys.exit(main(['evaluate', {str(markers)!r}, {str(markers)!r}, '--json'], services))"
     )

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from solver.body.bones import MODES
-from solver.outputs import FILES, SOMETIMES
-from solver.pipeline.stages import GRAPH, SOURCES
-from solver.solve.state import Energies
+from markerscope.solver.body.bones import MODES
+from markerscope.solver.fit.state import Energies
+from markerscope.solver.pipeline.stages import GRAPH, SOURCES
+from markerscope.solver.report.outputs import FILES, SOMETIMES
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = sorted(DOCS.glob("*.md"))

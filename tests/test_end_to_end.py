@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.body.skeleton import BONES, INDEX, JOINTS
-from solver.io import load_markers
-from solver.io.mot import read_mot
-from solver.pipeline import solve_session
-from solver.pipeline.request import SolveOutcome, SolveRequest
-from solver.progress import silent
-from tests.solve.conftest import simulate
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.commands import solve_session
+from markerscope.solver.core.progress import silent
+from markerscope.solver.core.request import SolveOutcome, SolveRequest
+from markerscope.solver.core.skeleton import BONES, INDEX, JOINTS
+from markerscope.solver.io import load_markers
+from markerscope.solver.io.mot import read_mot
+from tests.fit.conftest import simulate
 from tests.synthetic import Recording, record, session, watched
 
 ALWAYS = {
@@ -291,7 +291,7 @@ def test_poses_and_a_video_together(by_video: Solved, tmp_path: Path) -> None:
     nameless = tmp_path / "poses.npz"
     with np.load(made.prior) as file:
         np.savez(nameless, **{name: file[name] for name in file if name != "mocap_frame_rate"})
-    from solver.pipeline.inputs import PriorSettings, pose_prior
+    from markerscope.solver.pipeline.inputs import PriorSettings, pose_prior
 
     found = pose_prior({"prior_file": nameless, "landmarks": watched(made)}, PriorSettings(), silent)
     np.testing.assert_allclose(np.diff(found.time), 1 / made.rate, rtol=1e-6)

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from solver.body.model import Body
-from solver.body.skeleton import INDEX
-from solver.errors import InputError
-from solver.evaluate import evaluate, evaluate_result, lines_of, summary_of
-from solver.io.motion_in import read_motion
-from solver.pipeline.request import EvaluateRequest
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.request import EvaluateRequest
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.evaluate.evaluate import evaluate, evaluate_result, lines_of, summary_of
+from markerscope.solver.io.motion_in import read_motion
 
 RATE, FRAMES = 50.0, 60
 
@@ -118,7 +118,7 @@ def test_a_reference_with_neither_clock_nor_joints(tmp_path: Path, body: Body) -
 
 
 def test_bone_lengths_of_a_result_are_used(tmp_path: Path, body: Body) -> None:
-    from solver.body.bones import with_bone_lengths
+    from markerscope.solver.body.bones import with_bone_lengths
 
     longer = np.zeros(with_bone_lengths(body).shape_count - body.betas_count)
     longer[0] = 2
@@ -129,7 +129,7 @@ def test_bone_lengths_of_a_result_are_used(tmp_path: Path, body: Body) -> None:
 
 def test_markers_are_measured_to_both_surfaces(tmp_path: Path, body: Body, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("open3d")
-    from solver.markers import Markers
+    from markerscope.solver.core.markers import Markers
 
     poses, trans = moving()
     result = write(tmp_path / "out" / "motion.npz", body, poses, trans)
@@ -141,7 +141,7 @@ def test_markers_are_measured_to_both_surfaces(tmp_path: Path, body: Body, monke
     filled[::2, 3] = True
     positions = np.where(filled[..., None], 99.0, mesh[:, picked])
     markers = Markers(positions, RATE, tuple(map(str, range(30))), first_time=2.0, filled=filled)
-    monkeypatch.setattr("solver.io.markers_in.load_markers", lambda path: markers)
+    monkeypatch.setattr("markerscope.solver.io.markers_in.load_markers", lambda path: markers)
     (result.parent / "markers_labelled.c3d").touch()
     found = evaluate(result, reference)
     assert found.m2s < 1e-5, f"{found.m2s * 1000:.3f} mm from vertices of the surface itself"

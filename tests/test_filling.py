@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from solver.filling import filled_by_body
-from solver.markers import Markers
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.report.filling import filled_by_body
 
 FRAMES, COUNT = 50, 4
 

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.body.model import Body
-from solver.errors import InputError
-from solver.evaluate import evaluate, evaluate_result
-from solver.evaluate_angles import evaluate_angles
-from solver.io.export_mot import write_mot
-from solver.io.motion_in import read_motion
-from solver.pipeline.request import EvaluateRequest
-from solver.posed import angles_of, imported_result
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.request import EvaluateRequest
+from markerscope.solver.evaluate.evaluate import evaluate, evaluate_result
+from markerscope.solver.evaluate.evaluate_angles import evaluate_angles
+from markerscope.solver.evaluate.posed import angles_of, imported_result
+from markerscope.solver.io.export_mot import write_mot
+from markerscope.solver.io.motion_in import read_motion
 from tests.test_evaluate import FRAMES, RATE, moving, write
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.body.model import Body
-from solver.rotations import exp_so3, kabsch, log_so3, right_jacobian_inverse, slerp
-from solver.solve.kinematics import Points, Pose, forward, place_points, pose_jacobian, shape_jacobian
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.rotations import exp_so3, kabsch, log_so3, right_jacobian_inverse, slerp
+from markerscope.solver.fit.kinematics import Points, Pose, forward, place_points, pose_jacobian, shape_jacobian
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ def forbidden(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(forbidden: Path, *words: object) -> subprocess.CompletedProcess[str]:
     paths = [str(forbidden), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
-    line = [sys.executable, "-m", "app", *map(str, words)]
+    line = [sys.executable, "-m", "markerscope.app", *map(str, words)]
     return subprocess.run(line, cwd=ROOT, env=environment, capture_output=True, text=True)
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.body.skeleton import INDEX
-from solver.localize import R_LAB_UPRIGHT_CAMERA, Hypothesis, Search, hypotheses
-from solver.rotations import exp_so3
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.fit.localize import R_LAB_UPRIGHT_CAMERA, Hypothesis, Search, hypotheses
 
 FRAMES, PLACES = 6, 9
 

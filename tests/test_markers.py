@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.errors import InputError
-from solver.markers import Markers, UpAxis, lab_rotation
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers, UpAxis, lab_rotation
 
 
 def recording(count: int = 200, rate: float = 100.0, first: float = 5.0) -> Markers:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from solver import metrics
+from markerscope.solver.core import metrics
 
 
 def motion(seed: int = 0, frames: int = 20, joints: int = 24) -> np.ndarray:

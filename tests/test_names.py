@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli import main
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.io import load_markers
-from solver.outputs import FILES, write_formats
-from solver.pipeline.request import SolveRequest
-from solver.pipeline.run import run_stages
-from solver.pipeline.session import InputFile, Session, load_session, save_session
-from solver.pipeline.solve import session_of
-from solver.synth.files import FILES as SYNTH
-from tests.solve.conftest import simulate
+from markerscope.app.cli.main import main
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.commands.solve import session_of
+from markerscope.solver.core.request import SolveRequest
+from markerscope.solver.io import load_markers
+from markerscope.solver.pipeline.run import run_stages
+from markerscope.solver.pipeline.session import InputFile, Session, load_session, save_session
+from markerscope.solver.report.outputs import FILES, write_formats
+from markerscope.solver.synth.files import FILES as SYNTH
+from tests.fit.conftest import simulate
 from tests.synthetic import record
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="file names are text on this system")
@@ -118,7 +118,7 @@ def test_a_refusal_names_such_a_file(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 def test_a_mistake_about_such_a_file_is_logged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from app.cli_endings import ended
+    from markerscope.app.cli.endings import ended
 
     assert ended(ValueError(f"{BAD} cannot be understood")) == 1
     said = capsys.readouterr().err

@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli import main
-from solver.angles import AngleSettings, JointAngles, joint_angles, relative_to
-from solver.body.model import Body
-from solver.errors import InputError
-from solver.markers import Markers
-from solver.neutral import Neutral, NeutralSettings, facing, neutral_file, neutral_span
-from solver.pipeline.request import parse_neutral
-from solver.rotations import exp_so3
-from solver.solve.kinematics import Points
-from solver.solve.results import FittedMotion
-from tests.solve.test_known import fitted, standing
+from markerscope.app.cli.main import main
+from markerscope.solver.angles.angles import AngleSettings, JointAngles, joint_angles, relative_to
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.request import parse_neutral
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.fit.kinematics import Points
+from markerscope.solver.fit.neutral import Neutral, NeutralSettings, facing, neutral_file, neutral_span
+from markerscope.solver.fit.results import FittedMotion
+from tests.fit.test_known import fitted, standing
 
 
 @pytest.fixture(scope="module")

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.body.skeleton import INDEX
-from solver.markers import Markers
-from solver.outputs import labelled
-from solver.rotations import exp_so3
-from solver.solve.results import CameraResult, FittedMotion
+from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.fit.results import FittedMotion
+from markerscope.solver.report.outputs import labelled
 
 FRAMES = 20
 REACH = {"left_knee": (0.31, 0.05, 0.18), "right_hip": (0.02, 0.4)}

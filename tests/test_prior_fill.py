@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from solver.prior_fill import fill_lost
+from markerscope.solver.core.prior_fill import fill_lost
 
 
 @settings(max_examples=40, deadline=None)

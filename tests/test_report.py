@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.errors import InputError
-from solver.markers import Markers
-from solver.report import figure, render, write_report
-from solver.report_data import (
+from markerscope.solver.clustering.segment import segment
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.report.report import figure, render, write_report
+from markerscope.solver.report.report_data import (
     AngleCurve,
     Gaps,
     Groups,
@@ -26,8 +27,7 @@ from solver.report_data import (
     Stage,
     marker_residuals,
 )
-from solver.report_svg import affinity_colours, angle_plot, gaps_plot, nice_ticks, png
-from solver.segment import segment
+from markerscope.solver.report.report_svg import affinity_colours, angle_plot, gaps_plot, nice_ticks, png
 
 EVIL = "<script>alert(1)</script>\"&'"
 VOID = {"meta", "img", "br", "link", "input", "hr"}

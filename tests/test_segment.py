@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from solver.affinity import affinity, bridged
-from solver.errors import InputError
-from solver.markers import Markers
-from solver.segment import Segmentation, SegmentSettings, regroup, segment
+from markerscope.solver.clustering.affinity import affinity, bridged
+from markerscope.solver.clustering.segment import Segmentation, SegmentSettings, regroup, segment
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
 
 SIZES = (4, 3, 5, 6)
 
@@ -85,7 +85,7 @@ def test_rigid_pairs_have_no_deviation_far_from_the_origin() -> None:
 def test_chunks_do_not_change_the_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     positions = with_gaps(rigid_bodies()[0], 1, 0.3)
     whole = affinity(positions)
-    monkeypatch.setattr("solver.affinity._CHUNK_BYTES", 8 * positions.shape[1] ** 2 * 7)
+    monkeypatch.setattr("markerscope.solver.clustering.affinity._CHUNK_BYTES", 8 * positions.shape[1] ** 2 * 7)
     pieces = affinity(positions)
     np.testing.assert_allclose(whole.deviation, pieces.deviation, atol=1e-12)
     np.testing.assert_allclose(whole.distance, pieces.distance, atol=1e-12)

@@ -9,11 +9,12 @@ from typing import cast
 import numpy as np
 import pytest
 
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body, vertex_normals
-from solver.solve import anatomical
-from solver.solve.results import FittedMotion
-from solver.surface import surface_distance
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.meshes import vertex_normals
+from markerscope.solver.fit import anatomical
+from markerscope.solver.fit.results import FittedMotion
+from markerscope.solver.fit.surface import surface_distance
 
 
 def test_markers_at_a_known_height_over_the_skin() -> None:

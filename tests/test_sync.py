@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.errors import InputError
-from solver.markers import Markers
-from solver.sync import Sync, find_offset, lead
-from solver.video.landmarks import Landmarks
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.landmarks import Landmarks
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.sync.offset import Sync, find_offset, lead
 
 OFFSET = 1.234  # s
 

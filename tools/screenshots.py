@@ -27,7 +27,7 @@ if sys.platform.startswith("linux"):
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QWidget
 
-    from app.window.main import MainWindow
+    from markerscope.app.window.main import MainWindow
 
 Spin = Callable[..., None]
 
@@ -42,10 +42,10 @@ def main() -> int:
     from PySide6.QtCore import QEvent
     from PySide6.QtWidgets import QApplication
 
-    from app.models.home import Home
-    from app.models.workbench import Workbench
-    from app.window.main import MainWindow
-    from widgets import theme
+    from markerscope.app.models.home import Home
+    from markerscope.app.models.workbench import Workbench
+    from markerscope.app.window.main import MainWindow
+    from markerscope.widgets import theme
 
     app = QApplication([])
     theme.apply(app, "light")
@@ -87,7 +87,7 @@ def main() -> int:
 
 def open_copy(session: Path, copy: Path) -> None:
     """A copy that may be changed, as it looks when it is opened for the first time; the search is still to be run."""
-    from solver.pipeline.session import load_session, save_session
+    from markerscope.solver.pipeline.session import load_session, save_session
 
     later = ("localize", "orient", "fit", "angles", "surface")
     shutil.copytree(session, copy, ignore=shutil.ignore_patterns("view.json", "journal.json", "outputs.json"))
@@ -165,7 +165,7 @@ def pictures(window: MainWindow, spin: Spin, out: Path) -> None:
 
 def compared(window: MainWindow, spin: Spin, out: Path, dock: Callable[[str, str], None]) -> None:
     """The fit of the first answer beside one that trusts the video more."""
-    from app.models import edits
+    from markerscope.app.models import edits
 
     bench = window.bench
     first = {stage: bench.board.keys[stage] for stage in ("fit", "angles")}
@@ -190,9 +190,9 @@ def dialogs(window: MainWindow, spin: Spin, out: Path) -> None:
     from PySide6.QtCore import QTimer
     from PySide6.QtWidgets import QApplication
 
-    from app.cli_commands import DEMO_MARKERS, DEMO_VIDEO
-    from app.window.importing import ask_how_to_import
-    from widgets.dialogs.export_dialog import ExportDialog
+    from markerscope.app.models.demo import DEMO_MARKERS, DEMO_VIDEO
+    from markerscope.app.window.importing import ask_how_to_import
+    from markerscope.widgets.dialogs.export_dialog import ExportDialog
 
     def grab(name: str) -> None:
         def look() -> None:

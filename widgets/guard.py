@@ -9,7 +9,7 @@ from PySide6.QtCore import QRectF, Qt, QTimer
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
-from widgets import theme
+from markerscope.widgets import theme
 
 
 class PaintGuard:
@@ -44,7 +44,7 @@ class PaintGuard:
             QTimer.singleShot(0, self._widget, lambda: self._tell(said))
 
 
-def guard_paints(tell: Callable[[Exception], object], package: str = "widgets.") -> None:
+def guard_paints(tell: Callable[[Exception], object], package: str = "markerscope.widgets.") -> None:
     """Have every widget class of a package that is known by now paint under guard; a class is guarded once.
 
     Parameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QPoint, QRect, QSize, Qt
 from PySide6.QtGui import QIcon, QIconEngine, QPainter, QPixmap
 
-from widgets import theme
+from markerscope.widgets import theme
 
 GLYPHS = {
     "play": "play", "pause": "pause", "stop": "stop", "step_back": "step-backward", "step_forward": "step-forward",
@@ -32,7 +32,9 @@ GLYPHS = {
 
 
 def icon(name: str, colour: str = "text") -> QIcon:
-    """The icon called ``name`` in :data:`GLYPHS`, in one of the colours of :class:`widgets.theme.Colours`."""
+    """The icon called ``name`` in :data:`GLYPHS`, in one of the colours of
+    :class:`markerscope.widgets.theme.Colours`.
+    """
     if name not in GLYPHS:
         raise KeyError(f"no icon is called {name}")
     return QIcon(_Engine(name, colour))

@@ -11,7 +11,7 @@ import numpy as np
 from PySide6.QtCore import QRect
 from PySide6.QtGui import QImage, QPainter
 
-from widgets import theme
+from markerscope.widgets import theme
 
 
 def of_rgba(picture: np.ndarray) -> QImage:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from app.actions.action import MENUS, Action, Actions, Asks
-from app.actions.clean_actions import CLEAN_ACTIONS
-from app.actions.edit_actions import EDIT_ACTIONS
-from app.actions.neutral_actions import NEUTRAL_ACTIONS
-from app.actions.play_actions import PLAY_ACTIONS
-from app.actions.run_actions import RUN_ACTIONS
-from app.actions.session_actions import SESSION_ACTIONS
-from app.actions.view_actions import VIEW_ACTIONS
+from markerscope.app.actions.action import MENUS, Action, Actions, Asks
+from markerscope.app.actions.clean_actions import CLEAN_ACTIONS
+from markerscope.app.actions.edit_actions import EDIT_ACTIONS
+from markerscope.app.actions.neutral_actions import NEUTRAL_ACTIONS
+from markerscope.app.actions.play_actions import PLAY_ACTIONS
+from markerscope.app.actions.run_actions import RUN_ACTIONS
+from markerscope.app.actions.session_actions import SESSION_ACTIONS
+from markerscope.app.actions.view_actions import VIEW_ACTIONS
 
 ACTIONS = (
     *SESSION_ACTIONS,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from app.models.signal import Signal
-from app.models.workbench import Said, Workbench
+from markerscope.app.models.signal import Signal
+from markerscope.app.models.workbench import Said, Workbench
 
 
 class Asks(Protocol):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.actions.action import Action, Asks, first, needs
-from app.models import clean_edits
-from app.models.workbench import Said, Workbench
-from solver.clean.swaps import Proposal
-from solver.errors import InputError
+from markerscope.app.actions.action import Action, Asks, first, needs
+from markerscope.app.models import clean_edits
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.solver.cleaning.swaps import Proposal
+from markerscope.solver.core.errors import InputError
 
 _needs_clean = needs("clean", "the markers have not been cleaned")
 

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.actions.action import Action, Asks, Reason, first, needs, needs_idle, needs_session
-from app.actions.run_actions import run_until
-from app.models import edits, group_edits
-from app.models.edits import Edit
-from app.models.workbench import Workbench
-from solver.segment import Segmentation
+from markerscope.app.actions.action import Action, Asks, Reason, first, needs, needs_idle, needs_session
+from markerscope.app.actions.run_actions import run_until
+from markerscope.app.models import edits, group_edits
+from markerscope.app.models.edits import Edit
+from markerscope.app.models.workbench import Workbench
+from markerscope.solver.clustering.segment import Segmentation
 
 _needs_groups = needs("segment", "the groups of markers are not there")
 

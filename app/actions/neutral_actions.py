@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from app.actions.action import Action, Asks, needs, needs_session
-from app.models import edits
-from app.models.workbench import Workbench
+from markerscope.app.actions.action import Action, Asks, needs, needs_session
+from markerscope.app.models import edits
+from markerscope.app.models.workbench import Workbench
 
 _SPAN_S = 0.2
 """How long the pose under the cursor is averaged over."""

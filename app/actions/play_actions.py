@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.actions.action import Action, Asks, first, needs
-from app.models.clock import Clock
-from app.models.workbench import Said, Workbench
-from solver.errors import InputError
+from markerscope.app.actions.action import Action, Asks, first, needs
+from markerscope.app.models.clock import Clock
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.solver.core.errors import InputError
 
 
 def _empty(bench: Workbench) -> str:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from app.actions.action import Action, Asks, first, needs_idle, needs_session
-from app.models import edits
-from app.models.fields import title
-from app.models.workbench import Said, Workbench
-from solver.pipeline.request import Method
+from markerscope.app.actions.action import Action, Asks, first, needs_idle, needs_session
+from markerscope.app.models import edits
+from markerscope.app.models.fields import title
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.solver.core.request import Method
 
 
 def run_until(bench: Workbench, stage: str | None) -> None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.actions.action import Action, Asks, first, needs_idle, needs_session
-from app.cli_commands import DEMO_MARKERS, DEMO_VIDEO
-from app.models import edits, exports
-from app.models.workbench import Said, Workbench
-from solver.pipeline.session_file import EditedOutside
+from markerscope.app.actions.action import Action, Asks, first, needs_idle, needs_session
+from markerscope.app.models import edits, exports
+from markerscope.app.models.demo import DEMO_MARKERS, DEMO_VIDEO
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.solver.pipeline.session_file import EditedOutside
 
 
 def may_close(bench: Workbench, asks: Asks) -> bool:
@@ -28,7 +28,7 @@ def may_close(bench: Workbench, asks: Asks) -> bool:
 
 def open_path(bench: Workbench, asks: Asks, path: Path) -> bool:
     """Open whatever a path is: a session, or a marker file to begin one with (dropped, recent, on the command line)."""
-    from solver.pipeline.session import session_folder
+    from markerscope.solver.pipeline.session import session_folder
 
     if session_folder(path) is not None or (path.is_dir() and path.suffix == ".markerscope"):
         return may_close(bench, asks) and bench.open(path)

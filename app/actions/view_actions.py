@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from app.actions.action import Action, Asks, needs_session
-from app.models.display import COLOURS, LAYERS, ColourBy
-from app.models.workbench import Workbench
+from markerscope.app.actions.action import Action, Asks, needs_session
+from markerscope.app.models.display import COLOURS, LAYERS, ColourBy
+from markerscope.app.models.workbench import Workbench
 
 _COLOUR_TITLES: dict[ColourBy, str] = {
     "cluster": "Colour by group",

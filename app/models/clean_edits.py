@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from app.models.edits import Edit, decide
-from solver.clean.swaps import Proposal
-from solver.pipeline.methods import graph_of
-from solver.pipeline.session import Session
+from markerscope.app.models.edits import Edit, decide
+from markerscope.solver.cleaning.swaps import Proposal
+from markerscope.solver.pipeline.methods import graph_of
+from markerscope.solver.pipeline.session import Session
 
 
 def accept(session: Session, proposal: Proposal) -> Edit:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal, get_args
 
-from app.models.signal import Signal
+from markerscope.app.models.signal import Signal
 
 ColourBy = Literal["cluster", "bone", "residual", "gaps", "selection"]
 COLOURS: tuple[ColourBy, ...] = get_args(ColourBy)

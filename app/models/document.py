@@ -11,18 +11,35 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.models.edits import Edit, existing
-from app.models.history import History, Step
-from app.models.home import Home
-from app.models.journal import IN_FORCE, JOURNAL, VIEW, Writer, journal_of, read_answers, read_journal, read_view
-from app.models.keep import kept_decisions
-from app.models.signal import Signal
-from solver.errors import InputError
-from solver.io.atomic import cannot_write, make_folder
-from solver.pipeline.look import look_at
-from solver.pipeline.methods import graph_of, spelt_out
-from solver.pipeline.session import FILE_NAME, SUFFIX, InputFile, Session, load_session, save_session, session_folder
-from solver.pipeline.session_file import require_state, state_of
+from markerscope.app.models.edits import Edit, existing
+from markerscope.app.models.history import History, Step
+from markerscope.app.models.home import Home
+from markerscope.app.models.journal import (
+    IN_FORCE,
+    JOURNAL,
+    VIEW,
+    Writer,
+    journal_of,
+    read_answers,
+    read_journal,
+    read_view,
+)
+from markerscope.app.models.keep import kept_decisions
+from markerscope.app.models.signal import Signal
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.atomic import cannot_write, make_folder
+from markerscope.solver.pipeline.look import look_at
+from markerscope.solver.pipeline.methods import graph_of, spelt_out
+from markerscope.solver.pipeline.session import (
+    FILE_NAME,
+    SUFFIX,
+    InputFile,
+    Session,
+    load_session,
+    save_session,
+    session_folder,
+)
+from markerscope.solver.pipeline.session_file import require_state, state_of
 
 
 class Document:

@@ -11,14 +11,14 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from app.models.fields import Setting, setting_of, title
-from solver.errors import InputError
-from solver.pipeline.methods import graph_of
-from solver.pipeline.methods import with_method as solved_by
-from solver.pipeline.request import Method
-from solver.pipeline.session import InputFile, Session
-from solver.pipeline.settings import UNSET, overlay, to_table, without
-from solver.solve.counting import candidate_number
+from markerscope.app.models.fields import Setting, setting_of, title
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.request import Method
+from markerscope.solver.fit.counting import candidate_number
+from markerscope.solver.pipeline.methods import graph_of
+from markerscope.solver.pipeline.methods import with_method as solved_by
+from markerscope.solver.pipeline.session import InputFile, Session
+from markerscope.solver.pipeline.settings import UNSET, overlay, to_table, without
 
 DECISIONS = {
     "markers": ("start", "stop"),

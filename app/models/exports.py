@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.models.fields import title
-from app.models.stages import StageBoard
-from solver.errors import InputError
-from solver.io.atomic import make_folder, write_bytes_atomic
-from solver.io.together import together
-from solver.pipeline.methods import spelt_out
-from solver.pipeline.source import contents
-from solver.pipeline.stage import Event, GraphRun
+from markerscope.app.models.fields import title
+from markerscope.app.models.stages import StageBoard
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.atomic import make_folder, write_bytes_atomic
+from markerscope.solver.io.together import together
+from markerscope.solver.pipeline.methods import spelt_out
+from markerscope.solver.pipeline.source import contents
+from markerscope.solver.pipeline.stage import Event, GraphRun
 
 if TYPE_CHECKING:
-    from solver.report_data import Picture
+    from markerscope.solver.report.report_data import Picture
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ PICTURES = Format(
 
 def formats() -> tuple[Format, ...]:
     """All that can be written into a folder."""
-    from solver.outputs import FORMATS
+    from markerscope.solver.report.outputs import FORMATS
 
     return (*(Format(name, *_WORDS[name][:1], files, _WORDS[name][1]) for name, files in FORMATS.items()), PICTURES)
 
@@ -82,7 +82,7 @@ def export(
     ------
     InputError : a result is not there under the settings in force, or the file system refuses; nothing is written
     """
-    from solver.outputs import FORMATS, write_formats
+    from markerscope.solver.report.outputs import FORMATS, write_formats
 
     known = [*FORMATS, PICTURES.name]
     if unknown := set(chosen) - set(known):
@@ -161,6 +161,6 @@ def write_video(path: Path, frames: Iterable[np.ndarray], rate: float) -> int:
     ------
     InputError : there are none, or the file system refuses; nothing is left behind
     """
-    from solver.io.movie import write_movie
+    from markerscope.solver.io.movie import write_movie
 
     return write_movie(path, frames, rate)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
 
-from app.models.ranges import RANGES
-from solver.solve.counting import candidate_number
+from markerscope.app.models.ranges import RANGES
+from markerscope.solver.fit.counting import candidate_number
 
 Kind = Literal["float", "int", "bool", "choice", "text"]
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.models.results import Ref, Results
-from app.models.signal import Signal
-from app.models.stages import StageBoard
+from markerscope.app.models.results import Ref, Results
+from markerscope.app.models.signal import Signal
+from markerscope.app.models.stages import StageBoard
 
 MOST = 12
 """Fits that are compared at most, the newest: beyond that no eye tells the curves apart."""

@@ -12,8 +12,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from app.models.signal import Signal
-from solver.errors import InputError, MarkerscopeError
+from markerscope.app.models.signal import Signal
+from markerscope.solver.core.errors import InputError, MarkerscopeError
 
 _LONGEST_SIDE = 1920
 """px; a larger picture would take longer to unpack than a step of the clock may."""
@@ -166,7 +166,7 @@ class VideoFrames:
 
     def _run(self) -> None:
         """Decode, compress, keep."""
-        from solver.video.frames import announced, read_frames
+        from markerscope.solver.video.frames import announced, read_frames
 
         try:
             rate, count = announced(self.path)
@@ -195,7 +195,7 @@ class VideoFrames:
 
     def _peek(self) -> None:
         """Fetch the frame that is wanted from where the decoding has not come yet."""
-        from solver.video.frames import read_near
+        from markerscope.solver.video.frames import read_near
 
         while not self._stop.wait(0.02) and not self._done:
             with self._lock:

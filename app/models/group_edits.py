@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from app.models.edits import Edit, decide
-from solver.errors import InputError
-from solver.pipeline.methods import graph_of
-from solver.pipeline.session import Session
-from solver.segment import Segmentation, SegmentSettings, edited, regroup
+from markerscope.app.models.edits import Edit, decide
+from markerscope.solver.clustering.segment import Segmentation, SegmentSettings, edited, regroup
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline.methods import graph_of
+from markerscope.solver.pipeline.session import Session
 
 _BY_HAND = ("merges", "splits", "moves", "left_out")
 

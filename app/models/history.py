@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from solver.pipeline.session import Session
+from markerscope.solver.pipeline.session import Session
 
 _MOST = 500
 _DIALLED_S = 2.0

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from solver.errors import InputError
-from solver.io.atomic import make_folder, write_text_atomic
-from solver.pipeline.session import SUFFIX
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.atomic import make_folder, write_text_atomic
+from markerscope.solver.pipeline.session import SUFFIX
 
 _MOST_RECENT = 12
 

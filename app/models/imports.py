@@ -6,9 +6,9 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from solver.pipeline.inputs import MarkerSettings
-from solver.pipeline.request import Units, Up
-from solver.pipeline.settings import to_table
+from markerscope.solver.core.request import Units, Up
+from markerscope.solver.pipeline.inputs import MarkerSettings
+from markerscope.solver.pipeline.settings import to_table
 
 
 def new_session(

@@ -8,15 +8,15 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from statistics import median
 
-from app.models.results import Ref
-from app.models.signal import Signal
-from app.models.stages import Failure, StageBoard
-from solver.errors import Cancelled, InputError
-from solver.pipeline.run import run_session
-from solver.pipeline.session import Session
-from solver.pipeline.stage import Event, shares
-from solver.pipeline.worker import Failed, Finished, Job, Message, Progressed
-from solver.progress import Found
+from markerscope.app.models.results import Ref
+from markerscope.app.models.signal import Signal
+from markerscope.app.models.stages import Failure, StageBoard
+from markerscope.solver.core.errors import Cancelled, InputError
+from markerscope.solver.core.progress import Found
+from markerscope.solver.pipeline.run import run_session
+from markerscope.solver.pipeline.session import Session
+from markerscope.solver.pipeline.stage import Event, shares
+from markerscope.solver.pipeline.worker import Failed, Finished, Job, Message, Progressed
 
 _GUESS_S = 0.7
 """Seconds that a unit of a stage's cost takes, before anything is known of this computer."""

@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from app.models.history import History, Step
-from solver.errors import InputError
-from solver.io.atomic import write_text_atomic
-from solver.pipeline.session import session_document, session_from
+from markerscope.app.models.history import History, Step
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.atomic import write_text_atomic
+from markerscope.solver.pipeline.session import session_document, session_from
 
 JOURNAL = "journal.json"
 VIEW = "view.json"

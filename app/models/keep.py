@@ -11,13 +11,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from app.models.edits import Edit
-from solver.pipeline.methods import graph_of
-from solver.pipeline.session import Session
-from solver.pipeline.source import Source
-from solver.pipeline.stage import stage_keys
-from solver.pipeline.stages import SOURCES
-from solver.solve.counting import candidate_number
+from markerscope.app.models.edits import Edit
+from markerscope.solver.fit.counting import candidate_number
+from markerscope.solver.pipeline.methods import graph_of
+from markerscope.solver.pipeline.session import Session
+from markerscope.solver.pipeline.source import Source
+from markerscope.solver.pipeline.stage import stage_keys
+from markerscope.solver.pipeline.stages import SOURCES
 
 _BY_COLUMN = ("merges", "splits", "moves", "left_out")
 _BY_FRAME = ("keep", "swaps", "joins")

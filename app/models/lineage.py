@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from app.models.edits import Edit, differences, restore
-from app.models.fields import setting_of, settings_of, title
-from app.models.results import Results
-from solver.errors import InputError
-from solver.pipeline.methods import GRAPHS
-from solver.pipeline.session import Session
-from solver.pipeline.settings import UNSET, from_table
-from solver.pipeline.source import Source
-from solver.pipeline.stage import Stage, stage_keys
+from markerscope.app.models.edits import Edit, differences, restore
+from markerscope.app.models.fields import setting_of, settings_of, title
+from markerscope.app.models.results import Results
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline.methods import GRAPHS
+from markerscope.solver.pipeline.session import Session
+from markerscope.solver.pipeline.settings import UNSET, from_table
+from markerscope.solver.pipeline.source import Source
+from markerscope.solver.pipeline.stage import Stage, stage_keys
 
 _MOST_SAID = 3
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 
-from solver.pipeline.run import run_stages
-from solver.pipeline.session import Session
+from markerscope.solver.pipeline.run import run_stages
+from markerscope.solver.pipeline.session import Session
 
 
 class Reading:

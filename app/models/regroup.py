@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from app.models.results import Results
-from solver.errors import InputError
-from solver.pipeline.digest import canonical
-from solver.pipeline.stage import Stage
-from solver.pipeline.store import Absent
-from solver.segment import regroup
+from markerscope.app.models.results import Results
+from markerscope.solver.clustering.segment import regroup
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline.digest import canonical
+from markerscope.solver.pipeline.stage import Stage
+from markerscope.solver.pipeline.store import Absent
 
 _OF_THE_CUT = frozenset({"threshold", "groups", "merges", "splits", "moves", "left_out"})
 

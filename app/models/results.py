@@ -10,9 +10,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
-from app.models.signal import Signal
-from solver.pipeline.methods import result_type
-from solver.pipeline.store import Absent, Entry, Store
+from markerscope.app.models.signal import Signal
+from markerscope.solver.pipeline.methods import result_type
+from markerscope.solver.pipeline.store import Absent, Entry, Store
 
 _MEMORY = 1 << 30
 """Bytes of arrays that are kept at most; ten minutes of a full session take some 300 MB."""

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from app.models.signal import Signal
+from markerscope.app.models.signal import Signal
 
 How = Literal["replace", "add", "remove", "toggle"]
 _SINGLE = ("candidate", "hypothesis", "iteration", "stage")

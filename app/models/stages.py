@@ -8,20 +8,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from app.models.document import Document
-from app.models.edits import Edit, decided
-from app.models.fields import TITLES, Setting, settings_of, title
-from app.models.lineage import go_back, lineage_of, said_difference
-from app.models.regroup import regrouped
-from app.models.results import Ref, Results, StageResults
-from app.models.signal import Signal
-from solver.errors import InputError
-from solver.pipeline.methods import graph_of
-from solver.pipeline.session import Session
-from solver.pipeline.source import Source
-from solver.pipeline.stage import Stage, State, stage_keys
-from solver.pipeline.stages import SOURCES
-from solver.pipeline.store import Entry, Store
+from markerscope.app.models.document import Document
+from markerscope.app.models.edits import Edit, decided
+from markerscope.app.models.fields import TITLES, Setting, settings_of, title
+from markerscope.app.models.lineage import go_back, lineage_of, said_difference
+from markerscope.app.models.regroup import regrouped
+from markerscope.app.models.results import Ref, Results, StageResults
+from markerscope.app.models.signal import Signal
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline.methods import graph_of
+from markerscope.solver.pipeline.session import Session
+from markerscope.solver.pipeline.source import Source
+from markerscope.solver.pipeline.stage import Stage, State, stage_keys
+from markerscope.solver.pipeline.stages import SOURCES
+from markerscope.solver.pipeline.store import Entry, Store
 
 
 @dataclass(frozen=True)

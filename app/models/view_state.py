@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from app.models.workbench import Workbench
+    from markerscope.app.models.workbench import Workbench
 
 
 def view_of(bench: Workbench) -> dict[str, Any]:

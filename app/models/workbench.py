@@ -11,22 +11,22 @@ from typing import Any, Literal
 
 import numpy as np
 
-from app.models.clock import Clock, Timing
-from app.models.display import Display
-from app.models.document import Document
-from app.models.edits import Edit
-from app.models.fields import title
-from app.models.frames import VideoFrames
-from app.models.home import Home
-from app.models.jobs import Runner
-from app.models.reading import Reading
-from app.models.results import Ref, Unread
-from app.models.selection import Selection
-from app.models.signal import Signal
-from app.models.stages import Failure, StageBoard
-from app.models.view_state import restore_view, view_of
-from solver.errors import Cancelled, InputError, MarkerscopeError
-from solver.pipeline.store import Absent
+from markerscope.app.models.clock import Clock, Timing
+from markerscope.app.models.display import Display
+from markerscope.app.models.document import Document
+from markerscope.app.models.edits import Edit
+from markerscope.app.models.fields import title
+from markerscope.app.models.frames import VideoFrames
+from markerscope.app.models.home import Home
+from markerscope.app.models.jobs import Runner
+from markerscope.app.models.reading import Reading
+from markerscope.app.models.results import Ref, Unread
+from markerscope.app.models.selection import Selection
+from markerscope.app.models.signal import Signal
+from markerscope.app.models.stages import Failure, StageBoard
+from markerscope.app.models.view_state import restore_view, view_of
+from markerscope.solver.core.errors import Cancelled, InputError, MarkerscopeError
+from markerscope.solver.pipeline.store import Absent
 
 Level = Literal["note", "warning", "error"]
 _LOOK_AGAIN_S = 2.0

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.views.colours import Coloured, by_cluster
-from solver.markers import Markers
-from solver.segment import Segmentation, SegmentSettings, cut_at
+from markerscope.app.views.colours import Coloured, by_cluster
+from markerscope.solver.clustering.segment import Segmentation, SegmentSettings, cut_at
+from markerscope.solver.core.markers import Markers
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,10 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from app.views.colours import RGB
-from solver.angles import JointAngles, conventions, evidence
-from solver.body.skeleton import JOINTS
-from widgets import palette
+from markerscope.app.views.colours import RGB
+from markerscope.solver.angles.angles import JointAngles, conventions, evidence
+from markerscope.solver.core.skeleton import JOINTS
+from markerscope.widgets import palette
 
 Side = Literal["left", "right", ""]
 _LONG = {

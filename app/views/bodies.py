@@ -7,16 +7,25 @@ from functools import cached_property
 
 import numpy as np
 
-from app.views.posing import Detail, Pose, PosedPoints, bones_of, fixed_points, mesh_of, pose_at, skin_points
-from solver.body.model import Body
-from solver.localize import R_LAB_UPRIGHT_CAMERA
-from solver.markers import Markers
-from solver.neutral import Neutral, facing
-from solver.prior import PosePrior
-from solver.rotations import exp_so3, slerp
-from solver.solve.paper.results import PaperLocalization, Trace
-from solver.solve.results import Candidate, FittedMotion, Localization
-from solver.sync import Sync
+from markerscope.app.views.posing import (
+    Detail,
+    Pose,
+    PosedPoints,
+    bones_of,
+    fixed_points,
+    mesh_of,
+    pose_at,
+    skin_points,
+)
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.core.rotations import exp_so3, slerp
+from markerscope.solver.fit.localize import R_LAB_UPRIGHT_CAMERA
+from markerscope.solver.fit.neutral import Neutral, facing
+from markerscope.solver.fit.published.results import PaperLocalization, Trace
+from markerscope.solver.fit.results import Candidate, FittedMotion, Localization
+from markerscope.solver.sync.offset import Sync
 
 _SAME_TIME_S = 1e-6
 _BAND_M = 0.07

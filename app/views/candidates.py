@@ -8,14 +8,14 @@ from typing import Literal
 
 import numpy as np
 
-from app.views.bodies import BodyTrack
-from app.views.colours import bone_name
-from solver.body.skeleton import subtrees
-from solver.markers import Markers
-from solver.solve.confidence import same_answer
-from solver.solve.counting import candidate_number
-from solver.solve.paper.results import PaperLocalization
-from solver.solve.results import Localization, Orientation
+from markerscope.app.views.bodies import BodyTrack
+from markerscope.app.views.colours import bone_name
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.skeleton import subtrees
+from markerscope.solver.fit.confidence import same_answer
+from markerscope.solver.fit.counting import candidate_number
+from markerscope.solver.fit.published.results import PaperLocalization
+from markerscope.solver.fit.results import Localization, Orientation
 
 Fate = Literal["found", "too alike", "kept", "left behind", "merged", "scored", "refined"]
 """How far a way got: see ``FATES``."""
@@ -171,7 +171,7 @@ def bone_names(bones: Sequence[int] | np.ndarray) -> tuple[str, ...]:
 
 def part_of_bones(bones: np.ndarray) -> str:
     """The part of the body that they make up, in words."""
-    from solver.solve.method import part_name  # brings the solver and half of scipy with it
+    from markerscope.solver.fit.method import part_name  # brings the solver and half of scipy with it
 
     return part_name(bones)
 

@@ -8,9 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from app.views.tracks import FILLED, LOST, MEASURED, OUTLIER, STATE_NAMES
-from solver.body.skeleton import BONES, JOINTS
-from widgets import palette
+from markerscope.app.views.tracks import FILLED, LOST, MEASURED, OUTLIER, STATE_NAMES
+from markerscope.solver.core.skeleton import BONES, JOINTS
+from markerscope.widgets import palette
 
 ColourBy = Literal["cluster", "bone", "residual", "gaps", "selection"]
 RGB = tuple[int, int, int]
@@ -22,7 +22,9 @@ RESIDUAL_LIMIT_M = 0.03
 
 @dataclass(frozen=True)
 class Scale:
-    """A colour bar: the ends of its range in ``unit``, and the name of its colours in ``widgets.palette``."""
+    """A colour bar: the ends of its range in ``unit``, and the name of its colours in
+    ``markerscope.widgets.palette``.
+    """
 
     lo: float
     hi: float

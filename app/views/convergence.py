@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.views.colours import RGB, rgb
-from solver.solve.counting import candidate_number
-from solver.solve.paper.results import Descent, PaperLocalization, PaperSolve, Trace
-from solver.solve.results import Candidate, Orientation
-from widgets import palette
-from widgets.plots.scales import degrees
+from markerscope.app.views.colours import RGB, rgb
+from markerscope.solver.fit.counting import candidate_number
+from markerscope.solver.fit.published.results import Descent, PaperLocalization, PaperSolve, Trace
+from markerscope.solver.fit.results import Candidate, Orientation
+from markerscope.widgets import palette
+from markerscope.widgets.plots.scales import degrees
 
 _CHAINS_SHOWN = 5
 TO_THE_END = "all phases"

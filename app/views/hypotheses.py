@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.views.colours import RGB, rgb
-from solver.solve.confidence import same_answer
-from solver.solve.counting import candidate_number
-from solver.solve.doubts.rules import Verdict
-from solver.solve.paper.results import PaperSolve
-from solver.solve.results import Candidate, Orientation
-from widgets import palette
+from markerscope.app.views.colours import RGB, rgb
+from markerscope.solver.fit.confidence import same_answer
+from markerscope.solver.fit.counting import candidate_number
+from markerscope.solver.fit.doubts.rules import Verdict
+from markerscope.solver.fit.published.results import PaperSolve
+from markerscope.solver.fit.results import Candidate, Orientation
+from markerscope.widgets import palette
 
 TERMS = {
     "markers": ("markers", "distance of the markers from their places on the body"),

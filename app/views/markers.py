@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.views.colours import bone_name
-from app.views.tracks import MEASURED, MarkerTracks
-from solver.segment import Segmentation
-from solver.solve.doubts.rules import Verdict
-from solver.solve.results import FittedMotion
+from markerscope.app.views.colours import bone_name
+from markerscope.app.views.tracks import MEASURED, MarkerTracks
+from markerscope.solver.clustering.segment import Segmentation
+from markerscope.solver.fit.doubts.rules import Verdict
+from markerscope.solver.fit.results import FittedMotion
 
 
 @dataclass(frozen=True, eq=False)

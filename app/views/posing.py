@@ -7,10 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from solver.body.bone_meshes import bone_meshes
-from solver.body.model import Body, chain
-from solver.body.skeleton import JOINTS, PARENTS
-from solver.rotations import slerp
+from markerscope.solver.body.bone_meshes import bone_meshes
+from markerscope.solver.body.model import Body, chain
+from markerscope.solver.core.rotations import slerp
+from markerscope.solver.core.skeleton import JOINTS, PARENTS
 
 Detail = Literal["coarse", "full"]
 """The body's coarse mesh, for playing, or every vertex."""

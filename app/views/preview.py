@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.labels import prefix, subjects_of
-from solver.io.markers_in import markers_of, settled
-from solver.io.raw import RawMarkers
-from solver.io.units import cloud_size, settle_units
-from solver.markers import Markers, UpAxis, lab_rotation
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers, UpAxis, lab_rotation
+from markerscope.solver.io.labels import prefix, subjects_of
+from markerscope.solver.io.markers_in import markers_of, settled
+from markerscope.solver.io.raw import RawMarkers
+from markerscope.solver.io.units import cloud_size, settle_units
 
 _AXES: tuple[UpAxis, ...] = ("x", "y", "z")
 _PLACEHOLDER_HZ = 100.0

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.views.candidates import (
+from markerscope.app.views.candidates import (
     CHAMFER,
     MEANING,
     CandidateRow,
@@ -17,11 +17,11 @@ from app.views.candidates import (
     candidate_table,
     part_of_bones,
 )
-from app.views.colours import rgb
-from app.views.convergence import EnergyCurve
-from solver.progress import Found
-from solver.solve.results import Localization
-from widgets import palette
+from markerscope.app.views.colours import rgb
+from markerscope.app.views.convergence import EnergyCurve
+from markerscope.solver.core.progress import Found
+from markerscope.solver.fit.results import Localization
+from markerscope.widgets import palette
 
 
 def candidates_so_far(notes: Sequence[Found], found: Localization | None = None) -> CandidateTable | None:

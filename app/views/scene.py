@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.views.bodies import BodyTrack
-from app.views.colours import ColourBy, Coloured, by_bone, by_cluster, by_residual, by_selection, by_state
-from app.views.tracks import MarkerTracks
-from solver.segment import Segmentation
-from solver.solve.results import FittedMotion
+from markerscope.app.views.bodies import BodyTrack
+from markerscope.app.views.colours import ColourBy, Coloured, by_bone, by_cluster, by_residual, by_selection, by_state
+from markerscope.app.views.tracks import MarkerTracks
+from markerscope.solver.clustering.segment import Segmentation
+from markerscope.solver.fit.results import FittedMotion
 
 _NEAR_M, _REACH_M = 0.1, 0.2
 """How far a marker may be out of where nearly all are, and how far the body reaches beyond its joints."""

@@ -7,16 +7,16 @@ from typing import Protocol
 
 import numpy as np
 
-from app.models.display import Statistic
-from app.views.bodies import BodyTrack
-from app.views.clocks import on_clock, over_markers
-from app.views.tracks import FILLED, MEASURED, OUTLIER, MarkerTracks, pooled
-from solver.markers import Markers
-from solver.prior import PosePrior
-from solver.sync import Sync
-from solver.video.landmarks import Landmarks
-from widgets import palette
-from widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
+from markerscope.app.models.display import Statistic
+from markerscope.app.views.bodies import BodyTrack
+from markerscope.app.views.clocks import on_clock, over_markers
+from markerscope.app.views.tracks import FILLED, MEASURED, OUTLIER, MarkerTracks, pooled
+from markerscope.solver.core.landmarks import Landmarks
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.sync.offset import Sync
+from markerscope.widgets import palette
+from markerscope.widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
 
 CLEANING = "Cleaning"
 """Name of the row of what was cut and filled."""

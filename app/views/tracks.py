@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.markers import Markers
-from solver.solve.results import FittedMotion
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.fit.results import FittedMotion
 
 if TYPE_CHECKING:
-    from solver.clean.clean import Cut
+    from markerscope.solver.cleaning.clean import Cut
 
 MEASURED, FILLED, OUTLIER, LOST = range(4)
 STATE_NAMES = ("measured", "filled", "outlier taken out", "lost")

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.views.bodies import BodyTrack
-from app.views.posing import BONE_EDGES
-from app.views.tracks import MarkerTracks
-from solver.solve.results import CameraResult
-from solver.sync import Sync
-from solver.video.landmarks import LANDMARKS, Landmarks
+from markerscope.app.views.bodies import BodyTrack
+from markerscope.app.views.posing import BONE_EDGES
+from markerscope.app.views.tracks import MarkerTracks
+from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.core.landmarks import LANDMARKS, Landmarks
+from markerscope.solver.sync.offset import Sync
 
 _NEAR_S = 0.1
 """Landmarks further apart than this are not interpolated between."""

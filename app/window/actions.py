@@ -5,8 +5,8 @@ from __future__ import annotations
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMainWindow, QMenu
 
-from app.actions import Action, Actions
-from widgets.dialogs.command_palette import PaletteEntry
+from markerscope.app.actions import Action, Actions
+from markerscope.widgets.dialogs.command_palette import PaletteEntry
 
 _SEPARATED = {
     "session.example", "input.markers", "session.save", "session.close", "select.all", "select.groups", "candidate.pin",

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtWidgets import QFileDialog, QInputDialog, QMessageBox
 
-from app.window.exporting import ask_what_to_export, report_pictures
-from app.window.importing import ask_how_to_import
-from app.window.showing import Showing
-from app.window.videos import dialog_filter
+from markerscope.app.window.exporting import ask_what_to_export, report_pictures
+from markerscope.app.window.importing import ask_how_to_import
+from markerscope.app.window.showing import Showing
+from markerscope.app.window.videos import dialog_filter
 
 if TYPE_CHECKING:
-    from app.window.main import MainWindow
+    from markerscope.app.window.main import MainWindow
 
 _FILES = {
     "markers": ("Open markers", "Markers (*.c3d *.trc *.csv *.tsv *.txt *.C3D *.TRC *.CSV *.TSV *.TXT);;All files (*)"),
@@ -27,7 +27,7 @@ _FILES = {
 
 
 class WindowAsks:
-    """The window's side of ``app.actions.Asks``."""
+    """The window's side of ``markerscope.app.actions.Asks``."""
 
     def __init__(self, window: MainWindow) -> None:
         self.window = window

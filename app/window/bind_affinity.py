@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from PySide6.QtCore import Qt
 
-from app.models import group_edits
-from app.models.workbench import Workbench
-from app.views.affinity import affinity_picture, pair_distance, recut
-from app.window.bind_scene import SceneBinder
-from app.window.group_menu import GroupEdits
-from app.window.keys import how
-from app.window.shown import Shown
-from widgets.plots.affinity import AffinityView
-from widgets.plots.pair import PairPlot
+from markerscope.app.models import group_edits
+from markerscope.app.models.workbench import Workbench
+from markerscope.app.views.affinity import affinity_picture, pair_distance, recut
+from markerscope.app.window.bind_scene import SceneBinder
+from markerscope.app.window.group_menu import GroupEdits
+from markerscope.app.window.keys import how
+from markerscope.app.window.shown import Shown
+from markerscope.widgets.plots.affinity import AffinityView
+from markerscope.widgets.plots.pair import PairPlot
 
 
 class AffinityBinder:

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from PySide6.QtCore import QTimer
 
-from app.actions import Actions
-from app.actions.run_actions import run_stage
-from app.models import edits
-from app.models.results import Ref
-from app.models.workbench import Workbench
-from app.views.angles import angles_picture, bones_of, conventions, joint_of
-from app.window.shown import Shown
-from widgets.plots.curves import CurvesView
+from markerscope.app.actions import Actions
+from markerscope.app.actions.run_actions import run_stage
+from markerscope.app.models import edits
+from markerscope.app.models.results import Ref
+from markerscope.app.models.workbench import Workbench
+from markerscope.app.views.angles import angles_picture, bones_of, conventions, joint_of
+from markerscope.app.window.shown import Shown
+from markerscope.widgets.plots.curves import CurvesView
 
 
 class AnglesBinder:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from PySide6.QtCore import QTimer
 
-from app.models import edits
-from app.models.fits import CANDIDATE_COLOURS
-from app.models.workbench import Said, Workbench
-from app.views.candidates import CandidateTable as Table
-from app.views.candidates import candidate_table, covered_by
-from app.views.running import candidates_so_far
-from app.window.ghosts import Ghosts
-from app.window.shown import Shown
-from solver.progress import Found
-from solver.solve.results import Localization
-from widgets import palette
-from widgets.tables.candidates import CandidateTable
+from markerscope.app.models import edits
+from markerscope.app.models.fits import CANDIDATE_COLOURS
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.app.views.candidates import CandidateTable as Table
+from markerscope.app.views.candidates import candidate_table, covered_by
+from markerscope.app.views.running import candidates_so_far
+from markerscope.app.window.ghosts import Ghosts
+from markerscope.app.window.shown import Shown
+from markerscope.solver.core.progress import Found
+from markerscope.solver.fit.results import Localization
+from markerscope.widgets import palette
+from markerscope.widgets.tables.candidates import CandidateTable
 
 
 class CandidatesBinder:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from app.models.workbench import Workbench
-from app.views.convergence import TO_THE_END, EnergyCurve, of_orientation, of_paper
-from app.views.running import curves_so_far
-from app.window.ghosts import Ghosts
-from app.window.shown import Shown
-from solver.progress import Found
-from widgets.plots.convergence import ConvergenceView
+from markerscope.app.models.workbench import Workbench
+from markerscope.app.views.convergence import TO_THE_END, EnergyCurve, of_orientation, of_paper
+from markerscope.app.views.running import curves_so_far
+from markerscope.app.window.ghosts import Ghosts
+from markerscope.app.window.shown import Shown
+from markerscope.solver.core.progress import Found
+from markerscope.widgets.plots.convergence import ConvergenceView
 
 
 class ConvergenceBinder:
@@ -36,7 +36,7 @@ class ConvergenceBinder:
 
     def _results(self) -> tuple[EnergyCurve, ...]:
         found, ranked, solved = (self.shown.get(name) for name in ("localize", "orient", "solve"))
-        from solver.solve.paper.results import PaperLocalization
+        from markerscope.solver.fit.published.results import PaperLocalization
 
         if isinstance(found, PaperLocalization):
             return self.shown.once("curves", (found, solved, ranked), lambda: of_paper(found, solved, ranked))

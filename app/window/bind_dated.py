@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from app.models.fields import title
-from app.window.shown import Shown
-from widgets.panels.dated import Dated
+from markerscope.app.models.fields import title
+from markerscope.app.window.shown import Shown
+from markerscope.widgets.panels.dated import Dated
 
 _MARKERS = ("markers", "clean")
 DRAWN: Mapping[str, tuple[str, ...]] = {

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from app.models.workbench import Workbench
-from widgets.panels.history import HistoryList
+from markerscope.app.models.workbench import Workbench
+from markerscope.widgets.panels.history import HistoryList
 
 
 class HistoryBinder:

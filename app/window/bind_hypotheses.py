@@ -6,16 +6,16 @@ import numpy as np
 from PySide6.QtCore import QTimer
 from PySide6.QtGui import QImage
 
-from app.models import edits
-from app.models.workbench import Said, Workbench
-from app.views.hypotheses import HypothesesPicture, hypotheses_picture
-from app.views.posing import BONE_EDGES
-from app.window.ghosts import Ghosts
-from app.window.shown import Shown
-from widgets import palette
-from widgets.panels.hypotheses import HypothesesView
-from widgets.scene import Scene3D
-from widgets.scene.portraits import Portraits
+from markerscope.app.models import edits
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.app.views.hypotheses import HypothesesPicture, hypotheses_picture
+from markerscope.app.views.posing import BONE_EDGES
+from markerscope.app.window.ghosts import Ghosts
+from markerscope.app.window.shown import Shown
+from markerscope.widgets import palette
+from markerscope.widgets.panels.hypotheses import HypothesesView
+from markerscope.widgets.scene import Scene3D
+from markerscope.widgets.scene.portraits import Portraits
 
 
 class HypothesesBinder:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtCore import QTimer
 
-from app.models.workbench import Workbench
-from app.views.colours import by_cluster
-from app.views.markers import marker_table
-from app.window.shown import Shown
-from widgets.tables.markers import MarkerTable
+from markerscope.app.models.workbench import Workbench
+from markerscope.app.views.colours import by_cluster
+from markerscope.app.views.markers import marker_table
+from markerscope.app.window.shown import Shown
+from markerscope.widgets.tables.markers import MarkerTable
 
 
 class MarkersBinder:

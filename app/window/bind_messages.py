@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from PySide6.QtCore import QTimer
 
-from app.models.workbench import Said, Workbench
-from widgets.panels.message_bar import Level, Message, MessageBar
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.widgets.panels.message_bar import Level, Message, MessageBar
 
 _NOTE_MS = 12_000
 _LEVELS: dict[str, Level] = {"note": "info", "warning": "warning", "error": "error"}

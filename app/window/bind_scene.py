@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 from PySide6.QtCore import Qt
 
-from app.models.fields import title
-from app.models.workbench import Said, Workbench
-from app.views import scene
-from app.views.bodies import BodyTrack
-from app.views.colours import RGB, Legend
-from app.views.posing import BONE_EDGES
-from app.window.ghosts import Ghosts
-from app.window.keys import how
-from app.window.shown import Shown
-from widgets import palette, theme
-from widgets.scene import ColourBar, Scene3D
-from widgets.scene import Legend as Drawn
+from markerscope.app.models.fields import title
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.app.views import scene
+from markerscope.app.views.bodies import BodyTrack
+from markerscope.app.views.colours import RGB, Legend
+from markerscope.app.views.posing import BONE_EDGES
+from markerscope.app.window.ghosts import Ghosts
+from markerscope.app.window.keys import how
+from markerscope.app.window.shown import Shown
+from markerscope.widgets import palette, theme
+from markerscope.widgets.scene import ColourBar, Scene3D
+from markerscope.widgets.scene import Legend as Drawn
 
 _NONE = np.zeros((0, 3))
 _IVORY = (238, 230, 210)

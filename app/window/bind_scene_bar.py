@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from app.actions import Actions
-from app.models.display import COLOURS, LAYERS
-from app.models.workbench import Workbench
-from app.window.actions import native
-from widgets.panels.scene_bar import Choice, SceneBar
-from widgets.scene import Scene3D
+from markerscope.app.actions import Actions
+from markerscope.app.models.display import COLOURS, LAYERS
+from markerscope.app.models.workbench import Workbench
+from markerscope.app.window.actions import native
+from markerscope.widgets.panels.scene_bar import Choice, SceneBar
+from markerscope.widgets.scene import Scene3D
 
 
 def make_bar(table: Actions) -> SceneBar:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from PySide6.QtCore import QTimer
 
-from app.actions.run_actions import run_stage, run_until
-from app.models import edits
-from app.models.fields import title
-from app.models.jobs import Running
-from app.models.workbench import Workbench
-from widgets.panels.progress_strip import ProgressStrip
-from widgets.panels.stage_data import StageProgress
-from widgets.panels.stage_panel import StagePanel
+from markerscope.app.actions.run_actions import run_stage, run_until
+from markerscope.app.models import edits
+from markerscope.app.models.fields import title
+from markerscope.app.models.jobs import Running
+from markerscope.app.models.workbench import Workbench
+from markerscope.widgets.panels.progress_strip import ProgressStrip
+from markerscope.widgets.panels.stage_data import StageProgress
+from markerscope.widgets.panels.stage_panel import StagePanel
 
 
 class StagesBinder:

@@ -7,20 +7,20 @@ from typing import cast
 import numpy as np
 from PySide6.QtCore import QTimer
 
-from app.models import edits
-from app.models.fits import CachedFits, colour_places
-from app.models.workbench import Workbench
-from app.views import timelines as views
-from app.views.colours import by_cluster
-from app.window.ghosts import Ghosts
-from app.window.keys import how
-from app.window.residual_menu import ResidualMenu
-from app.window.shown import Shown
-from solver.solve.counting import candidate_number
-from solver.sync import Sync
-from widgets import palette
-from widgets.plots.rows import Curve, CurveRow, Row
-from widgets.plots.timelines import Timelines
+from markerscope.app.models import edits
+from markerscope.app.models.fits import CachedFits, colour_places
+from markerscope.app.models.workbench import Workbench
+from markerscope.app.views import timelines as views
+from markerscope.app.views.colours import by_cluster
+from markerscope.app.window.ghosts import Ghosts
+from markerscope.app.window.keys import how
+from markerscope.app.window.residual_menu import ResidualMenu
+from markerscope.app.window.shown import Shown
+from markerscope.solver.fit.counting import candidate_number
+from markerscope.solver.sync.offset import Sync
+from markerscope.widgets import palette
+from markerscope.widgets.plots.rows import Curve, CurveRow, Row
+from markerscope.widgets.plots.timelines import Timelines
 
 RESIDUAL = "Residual"
 _LONGEST = 34

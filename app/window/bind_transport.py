@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from app.models.workbench import Workbench
-from widgets.panels.transport import Readout, Transport
+from markerscope.app.models.workbench import Workbench
+from markerscope.widgets.panels.transport import Readout, Transport
 
 
 class TransportBinder:

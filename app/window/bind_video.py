@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.models.fields import title
-from app.models.frames import VideoFrame
-from app.models.workbench import Said, Workbench
-from app.views import scene, video
-from app.views.posing import BONE_EDGES
-from app.window.bind_scene import TROUBLE_REMEDY
-from app.window.keys import how
-from app.window.shown import Shown
-from solver.sync import Sync
-from widgets.video import VideoView
+from markerscope.app.models.fields import title
+from markerscope.app.models.frames import VideoFrame
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.app.views import scene, video
+from markerscope.app.views.posing import BONE_EDGES
+from markerscope.app.window.bind_scene import TROUBLE_REMEDY
+from markerscope.app.window.keys import how
+from markerscope.app.window.shown import Shown
+from markerscope.solver.sync.offset import Sync
+from markerscope.widgets.video import VideoView
 
 _BODY, _BONES, _OLD = (86, 180, 233), (255, 255, 255), (150, 150, 150)
 """Colours of the projected body and its bones, and of both where the fit is out of date."""

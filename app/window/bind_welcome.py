@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from app.actions import Actions
-from app.models.workbench import Workbench
-from widgets.panels.welcome import Recent, WelcomePage
+from markerscope.app.actions import Actions
+from markerscope.app.models.workbench import Workbench
+from markerscope.widgets.panels.welcome import Recent, WelcomePage
 
 
 class WelcomeBinder:

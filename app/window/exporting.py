@@ -11,13 +11,13 @@ from PySide6.QtCore import QBuffer, QIODevice, Qt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QProgressDialog, QWidget
 
-from app.models import exports
-from solver.errors import Cancelled
-from widgets.dialogs.export_dialog import ExportDialog, ExportFormat
-from widgets.images import to_rgb
+from markerscope.app.models import exports
+from markerscope.solver.core.errors import Cancelled
+from markerscope.widgets.dialogs.export_dialog import ExportDialog, ExportFormat
+from markerscope.widgets.images import to_rgb
 
 if TYPE_CHECKING:
-    from app.window.main import MainWindow
+    from markerscope.app.window.main import MainWindow
 
 _USUAL = {"angles", "mot", "c3d", "report"}
 _RATE = 25.0
@@ -67,7 +67,7 @@ def png_of(image: QImage) -> bytes:
 
 def report_pictures(window: MainWindow) -> list[Any]:
     """Views of the session as it is shown now."""
-    from solver.report_data import Picture
+    from markerscope.solver.report.report_data import Picture
 
     found = [Picture("The fitted body and the markers", png_of(window.scene.image(1.0, (900, 700))))]
     if window.bench.frames is not None:

@@ -7,18 +7,18 @@ from functools import partial
 
 import numpy as np
 
-from app.models.fits import CANDIDATE_COLOURS, colour_places
-from app.models.signal import Signal
-from app.models.workbench import Workbench
-from app.views import bodies
-from app.views.bodies import BodyTrack
-from app.views.candidates import part_of_bones
-from app.views.colours import RGB, rgb
-from app.views.convergence import EnergyCurve
-from app.window.shown import Shown
-from solver.solve.counting import candidate_number
-from solver.solve.results import Localization
-from widgets import palette
+from markerscope.app.models.fits import CANDIDATE_COLOURS, colour_places
+from markerscope.app.models.signal import Signal
+from markerscope.app.models.workbench import Workbench
+from markerscope.app.views import bodies
+from markerscope.app.views.bodies import BodyTrack
+from markerscope.app.views.candidates import part_of_bones
+from markerscope.app.views.colours import RGB, rgb
+from markerscope.app.views.convergence import EnergyCurve
+from markerscope.app.window.shown import Shown
+from markerscope.solver.fit.counting import candidate_number
+from markerscope.solver.fit.results import Localization
+from markerscope.widgets import palette
 
 NEUTRAL_COLOUR: RGB = (120, 130, 140)
 

@@ -10,15 +10,15 @@ from PySide6.QtCore import QEvent, QObject, QPoint, Qt
 from PySide6.QtGui import QContextMenuEvent, QMouseEvent
 from PySide6.QtWidgets import QMenu
 
-from app.actions import Actions
-from app.models import group_edits
-from app.models.edits import Edit
-from app.models.workbench import Workbench
-from app.views.colours import by_cluster
-from app.window.actions import native
-from app.window.shown import Shown
-from widgets.plots.affinity_menu import edit_menu
-from widgets.scene import Scene3D
+from markerscope.app.actions import Actions
+from markerscope.app.models import group_edits
+from markerscope.app.models.edits import Edit
+from markerscope.app.models.workbench import Workbench
+from markerscope.app.views.colours import by_cluster
+from markerscope.app.window.actions import native
+from markerscope.app.window.shown import Shown
+from markerscope.widgets.plots.affinity_menu import edit_menu
+from markerscope.widgets.scene import Scene3D
 
 _CLICK_PX = 4
 

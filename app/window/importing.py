@@ -8,20 +8,20 @@ from typing import Any, cast
 
 from PySide6.QtWidgets import QDialog, QWidget
 
-from app.models.imports import new_session
-from app.views.preview import ImportPreview, preview_of
-from app.window.videos import videos_beside
-from solver.errors import InputError
-from solver.markers import UpAxis
-from widgets.dialogs.import_data import ImportChoice, ImportShown
-from widgets.dialogs.import_dialog import ImportDialog
+from markerscope.app.models.imports import new_session
+from markerscope.app.views.preview import ImportPreview, preview_of
+from markerscope.app.window.videos import videos_beside
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import UpAxis
+from markerscope.widgets.dialogs.import_data import ImportChoice, ImportShown
+from markerscope.widgets.dialogs.import_dialog import ImportDialog
 
 
 class Importing:
     """Answers every change of the dialog with the file as it then would be read."""
 
     def __init__(self, dialog: ImportDialog, path: Path) -> None:
-        from solver.io.markers_in import read_raw
+        from markerscope.solver.io.markers_in import read_raw
 
         self.dialog, self.path = dialog, path
         self.raw = read_raw(path)

@@ -9,53 +9,53 @@ from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 
-from app.actions import ACTIONS, Actions, Asks
-from app.actions.session_actions import may_close, open_path
-from app.models import edits
-from app.models.workbench import Said, Workbench
-from app.window.actions import Menus
-from app.window.asks import WindowAsks
-from app.window.bind_affinity import AffinityBinder
-from app.window.bind_angles import AnglesBinder
-from app.window.bind_candidates import CandidatesBinder
-from app.window.bind_convergence import ConvergenceBinder
-from app.window.bind_dated import DatedBinder
-from app.window.bind_history import HistoryBinder
-from app.window.bind_hypotheses import HypothesesBinder
-from app.window.bind_markers import MarkersBinder
-from app.window.bind_messages import MessagesBinder
-from app.window.bind_scene import SceneBinder
-from app.window.bind_scene_bar import SceneBarBinder, make_bar
-from app.window.bind_stages import StagesBinder
-from app.window.bind_timelines import TimelinesBinder
-from app.window.bind_transport import TransportBinder
-from app.window.bind_video import VideoBinder
-from app.window.bind_welcome import WelcomeBinder
-from app.window.collecting import Collecting
-from app.window.docks import Docks, Panel
-from app.window.ghosts import Ghosts
-from app.window.group_menu import SceneMenu
-from app.window.keys import wants
-from app.window.remembering import parts_of, restore
-from app.window.shown import Shown
-from app.window.videos import is_video
-from widgets.panels.dated import Dated
-from widgets.panels.history import HistoryList
-from widgets.panels.hypotheses import HypothesesView
-from widgets.panels.message_bar import MessageBar
-from widgets.panels.progress_strip import ProgressStrip
-from widgets.panels.stage_panel import StagePanel
-from widgets.panels.transport import Transport
-from widgets.panels.welcome import WelcomePage
-from widgets.plots.affinity import AffinityView
-from widgets.plots.convergence import ConvergenceView
-from widgets.plots.curves import CurvesView
-from widgets.plots.pair import PairPlot
-from widgets.plots.timelines import Timelines
-from widgets.scene import Scene3D
-from widgets.tables.candidates import CandidateTable
-from widgets.tables.markers import MarkerTable
-from widgets.video import VideoView
+from markerscope.app.actions import ACTIONS, Actions, Asks
+from markerscope.app.actions.session_actions import may_close, open_path
+from markerscope.app.models import edits
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.app.window.actions import Menus
+from markerscope.app.window.asks import WindowAsks
+from markerscope.app.window.bind_affinity import AffinityBinder
+from markerscope.app.window.bind_angles import AnglesBinder
+from markerscope.app.window.bind_candidates import CandidatesBinder
+from markerscope.app.window.bind_convergence import ConvergenceBinder
+from markerscope.app.window.bind_dated import DatedBinder
+from markerscope.app.window.bind_history import HistoryBinder
+from markerscope.app.window.bind_hypotheses import HypothesesBinder
+from markerscope.app.window.bind_markers import MarkersBinder
+from markerscope.app.window.bind_messages import MessagesBinder
+from markerscope.app.window.bind_scene import SceneBinder
+from markerscope.app.window.bind_scene_bar import SceneBarBinder, make_bar
+from markerscope.app.window.bind_stages import StagesBinder
+from markerscope.app.window.bind_timelines import TimelinesBinder
+from markerscope.app.window.bind_transport import TransportBinder
+from markerscope.app.window.bind_video import VideoBinder
+from markerscope.app.window.bind_welcome import WelcomeBinder
+from markerscope.app.window.collecting import Collecting
+from markerscope.app.window.docks import Docks, Panel
+from markerscope.app.window.ghosts import Ghosts
+from markerscope.app.window.group_menu import SceneMenu
+from markerscope.app.window.keys import wants
+from markerscope.app.window.remembering import parts_of, restore
+from markerscope.app.window.shown import Shown
+from markerscope.app.window.videos import is_video
+from markerscope.widgets.panels.dated import Dated
+from markerscope.widgets.panels.history import HistoryList
+from markerscope.widgets.panels.hypotheses import HypothesesView
+from markerscope.widgets.panels.message_bar import MessageBar
+from markerscope.widgets.panels.progress_strip import ProgressStrip
+from markerscope.widgets.panels.stage_panel import StagePanel
+from markerscope.widgets.panels.transport import Transport
+from markerscope.widgets.panels.welcome import WelcomePage
+from markerscope.widgets.plots.affinity import AffinityView
+from markerscope.widgets.plots.convergence import ConvergenceView
+from markerscope.widgets.plots.curves import CurvesView
+from markerscope.widgets.plots.pair import PairPlot
+from markerscope.widgets.plots.timelines import Timelines
+from markerscope.widgets.scene import Scene3D
+from markerscope.widgets.tables.candidates import CandidateTable
+from markerscope.widgets.tables.markers import MarkerTable
+from markerscope.widgets.video import VideoView
 
 BUSY_MS, IDLE_MS, REMEMBER_MS = 12, 60, 1500
 _LEFT = Qt.DockWidgetArea.LeftDockWidgetArea

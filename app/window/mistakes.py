@@ -6,9 +6,9 @@ import sys
 import traceback
 from types import TracebackType
 
-from app.models.workbench import Said, Workbench
-from solver.errors import MarkerscopeError
-from widgets.guard import end_painters, guard_paints
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.solver.core.errors import MarkerscopeError
+from markerscope.widgets.guard import end_painters, guard_paints
 
 _REMEDY = "save the session; if it comes again, report it with what the terminal says"
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QByteArray
 
 if TYPE_CHECKING:
-    from app.window.main import MainWindow
+    from markerscope.app.window.main import MainWindow
 
 LAYOUT_VERSION = 1
 

@@ -7,9 +7,9 @@ from functools import partial
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu
 
-from app.models.display import STATISTICS
-from app.models.fits import CachedFits
-from app.models.workbench import Workbench
+from markerscope.app.models.display import STATISTICS
+from markerscope.app.models.fits import CachedFits
+from markerscope.app.models.workbench import Workbench
 
 _LONGEST = 60
 

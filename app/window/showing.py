@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QApplication, QMessageBox
 
-from app.models.workbench import Said
-from app.window.exporting import write_playback, write_turntable
-from solver import __version__
-from solver.errors import InputError
-from solver.io.atomic import cannot_write
-from widgets import theme
-from widgets.dialogs.command_palette import CommandPalette, PaletteEntry
-from widgets.dialogs.shortcut_sheet import ShortcutSheet
+from markerscope.app.models.workbench import Said
+from markerscope.app.window.exporting import write_playback, write_turntable
+from markerscope.solver import __version__
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.atomic import cannot_write
+from markerscope.widgets import theme
+from markerscope.widgets.dialogs.command_palette import CommandPalette, PaletteEntry
+from markerscope.widgets.dialogs.shortcut_sheet import ShortcutSheet
 
 if TYPE_CHECKING:
-    from app.window.main import MainWindow
+    from markerscope.app.window.main import MainWindow
 
 
 class Showing:

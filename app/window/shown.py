@@ -8,17 +8,17 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.models.results import Ref
-from app.models.signal import Signal
-from app.models.workbench import Workbench
-from app.views import bodies
-from app.views.bodies import BodyTrack
-from app.views.tracks import MarkerTracks, tracks_of
+from markerscope.app.models.results import Ref
+from markerscope.app.models.signal import Signal
+from markerscope.app.models.workbench import Workbench
+from markerscope.app.views import bodies
+from markerscope.app.views.bodies import BodyTrack
+from markerscope.app.views.tracks import MarkerTracks, tracks_of
 
 if TYPE_CHECKING:
-    from solver.body.model import Body
-    from solver.markers import Markers
-    from solver.solve.results import FittedMotion
+    from markerscope.solver.body.model import Body
+    from markerscope.solver.core.markers import Markers
+    from markerscope.solver.fit.results import FittedMotion
 
 WANTED = (
     "markers", "clean", "landmarks", "prior", "sync", "segment", "localize", "solve", "orient", "fit", "neutral",
@@ -208,8 +208,8 @@ class Shown:
         return None if given is None else given.path
 
     def _load_body(self, path: Path | None) -> None:
-        from solver.body.bones import with_bone_lengths
-        from solver.body.model import Body
+        from markerscope.solver.body.bones import with_bone_lengths
+        from markerscope.solver.body.model import Body
 
         self._bodies = {path: with_bone_lengths(Body.load(path))}
 

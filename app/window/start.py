@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from solver.errors import InputError
+from markerscope.solver.core.errors import InputError
 
 _LIBRARIES = {
     "libxcb-cursor.so.0": "libxcb-cursor0",
@@ -78,12 +78,12 @@ def open_window(path: Path | None = None, example: bool = False) -> int:
     from PySide6.QtCore import QTimer
     from PySide6.QtWidgets import QApplication
 
-    from app.actions.view_actions import TEXT_PERCENT
-    from app.models.home import Home
-    from app.models.workbench import Workbench
-    from app.window.main import MainWindow
-    from app.window.mistakes import Mistakes
-    from widgets import theme
+    from markerscope.app.actions.view_actions import TEXT_PERCENT
+    from markerscope.app.models.home import Home
+    from markerscope.app.models.workbench import Workbench
+    from markerscope.app.window.main import MainWindow
+    from markerscope.app.window.mistakes import Mistakes
+    from markerscope.widgets import theme
 
     app = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(app, QApplication)

@@ -5,21 +5,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from solver.bench.request import BenchRequest
-    from solver.pipeline.request import Outcome
-    from solver.progress import Progress
+    from markerscope.solver.bench.request import BenchRequest
+    from markerscope.solver.core.progress import Progress
+    from markerscope.solver.core.request import Outcome
 
 
 def run_bench(request: BenchRequest, progress: Progress) -> Outcome:
-    """See ``solver.bench.bench``; loaded when called, so that the command line answers at once."""
+    """See ``markerscope.solver.bench.bench``; loaded when called, so that the command line answers at once."""
     if request.suite == "clean":
-        from solver.bench.clean import clean_suite
+        from markerscope.solver.bench.clean import clean_suite
 
         return clean_suite(request, progress)
     if request.suite == "neural":
-        from solver.bench.neural import neural_suite
+        from markerscope.solver.bench.neural import neural_suite
 
         return neural_suite(request, progress)
-    from solver.bench.bench import run_bench as run
+    from markerscope.solver.bench.bench import run_bench as run
 
     return run(request, progress)

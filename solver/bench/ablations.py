@@ -9,15 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from solver.bench.methods import PAPER_CODE, Given, Solved, Variant, bundle, outcome, paper, run_stages
-from solver.body.model import Body
-from solver.markers import Markers
-from solver.progress import Progress, silent
-from solver.solve.paper.results import BodyState
-from solver.solve.paper.settings import PaperLocalizeSettings, PaperSolveSettings
-from solver.solve.results import CameraResult, FittedMotion
-from solver.solve.settings import LocalizeSettings, OrientSettings
-from solver.solve.state import Observations, Weights
+from markerscope.solver.bench.methods import PAPER_CODE, Given, Solved, Variant, bundle, outcome, paper, run_stages
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.progress import Progress, silent
+from markerscope.solver.fit.published.results import BodyState
+from markerscope.solver.fit.published.settings import PaperLocalizeSettings, PaperSolveSettings
+from markerscope.solver.fit.results import FittedMotion
+from markerscope.solver.fit.settings import LocalizeSettings, OrientSettings
+from markerscope.solver.fit.state import Observations, Weights
 
 _OFFSET = 0.0095
 
@@ -33,10 +34,10 @@ class HeldPlacement(OrientSettings):
 
 def unfitted(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
     """The cheapest hypothesis of the default method as it is: the video's pose, turned and shifted onto the markers."""
-    from solver.pipeline.fitting import scene
-    from solver.solve.kinematics import Pose, forward, place_points
-    from solver.solve.paper.motion import fitted_motion
-    from solver.solve.placement import Skin
+    from markerscope.solver.fit.kinematics import Pose, forward, place_points
+    from markerscope.solver.fit.placement import Skin
+    from markerscope.solver.fit.published.motion import fitted_motion
+    from markerscope.solver.pipeline.fitting import scene
 
     results, seconds = run_stages("bundle", given, settings, "localize", progress)
     body, seen, _ = scene(results)
@@ -69,7 +70,7 @@ def unfitted(given: Given, settings: Mapping[str, Any], progress: Progress = sil
 
 def paper_by_stages(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
     """The published method, with what it had after part matching, stage 2 and stage 4 of its best yaw (table 4)."""
-    from solver.pipeline.fitting import scene
+    from markerscope.solver.pipeline.fitting import scene
 
     results, seconds = run_stages("paper", given, settings, "fit", progress)
     body, seen, _ = scene(results)
@@ -80,11 +81,11 @@ def paper_by_stages(given: Given, settings: Mapping[str, Any], progress: Progres
 def _paper_steps(
     body: Body, seen: Observations, markers: Markers, results: Mapping[str, Any]
 ) -> dict[str, FittedMotion]:
-    from solver.rotations import slerp
-    from solver.solve.kinematics import Pose
-    from solver.solve.paper.motion import fitted_motion, full_shape
-    from solver.solve.paper.sequence import sequence_of, turned_video
-    from solver.solve.paper.solve import nearest_on_average
+    from markerscope.solver.core.rotations import slerp
+    from markerscope.solver.fit.kinematics import Pose
+    from markerscope.solver.fit.published.motion import fitted_motion, full_shape
+    from markerscope.solver.fit.published.sequence import sequence_of, turned_video
+    from markerscope.solver.fit.published.solve import nearest_on_average
 
     found, solved, last = results["localize"], results["solve"], results["fit"]
     best = solved.yaws[solved.chosen]

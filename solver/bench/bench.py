@@ -9,23 +9,23 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from solver import __version__
-from solver.bench.cases import FRAMES, Case, cases_of
-from solver.bench.cold import cold_seconds
-from solver.bench.descents import descents_of
-from solver.bench.execute import Run, with_key
-from solver.bench.keys import key_of
-from solver.bench.machine import machine
-from solver.bench.motions import MotionSource, find_motions
-from solver.bench.registry import method_named, with_ablations
-from solver.bench.request import BenchRequest
-from solver.bench.runner import run_all, write_tables
-from solver.bench.table import bins_of, markdown_of, rows_of
-from solver.io.atomic import make_folder, write_text_atomic
-from solver.parallel import cores
-from solver.pipeline.request import Outcome
-from solver.plain import json_text
-from solver.progress import Progress, part_of, silent
+from markerscope.solver import __version__
+from markerscope.solver.bench.cases import FRAMES, Case, cases_of
+from markerscope.solver.bench.cold import cold_seconds
+from markerscope.solver.bench.descents import descents_of
+from markerscope.solver.bench.execute import Run, with_key
+from markerscope.solver.bench.keys import key_of
+from markerscope.solver.bench.machine import machine
+from markerscope.solver.bench.motions import MotionSource, find_motions
+from markerscope.solver.bench.registry import method_named, with_ablations
+from markerscope.solver.bench.request import BenchRequest
+from markerscope.solver.bench.runner import run_all, write_tables
+from markerscope.solver.bench.table import bins_of, markdown_of, rows_of
+from markerscope.solver.core.parallel import cores
+from markerscope.solver.core.plain import json_text
+from markerscope.solver.core.progress import Progress, part_of, silent
+from markerscope.solver.core.request import Outcome
+from markerscope.solver.io.atomic import make_folder, write_text_atomic
 
 _METHODS = ("bundle",)
 _MOTIONS = {"short": 2}

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from solver.body.skeleton import PARTS
-from solver.errors import InputError
-from solver.synth.settings import SynthSettings
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.skeleton import PARTS
+from markerscope.solver.synth.settings import SynthSettings
 
 FRAMES = 450
 """Frames of a case where nothing else is said: 15 s at 30 Hz, as in the paper's sequences."""

@@ -11,20 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from solver import __version__
-from solver.bench.clean_tables import CleanTables, FillRow, OutlierRow
-from solver.bench.machine import machine
-from solver.bench.request import BenchRequest
-from solver.bench.runner import write_tables
-from solver.clean.fill import METHODS, fill
-from solver.clean.gap_model import GapModel, draw_gaps, draw_shifts, heavy_tailed, read_gap_statistics
-from solver.clean.gaps import Filled, FillSettings
-from solver.clean.outliers import OutlierSettings, find_outliers
-from solver.clean.request import Method, OutlierMethod
-from solver.errors import InputError
-from solver.pipeline.request import Outcome
-from solver.plain import json_text
-from solver.progress import Progress, silent
+from markerscope.solver import __version__
+from markerscope.solver.bench.clean_tables import CleanTables, FillRow, OutlierRow
+from markerscope.solver.bench.machine import machine
+from markerscope.solver.bench.request import BenchRequest
+from markerscope.solver.bench.runner import write_tables
+from markerscope.solver.cleaning.fill import METHODS, fill
+from markerscope.solver.cleaning.gap_model import GapModel, draw_gaps, draw_shifts, heavy_tailed, read_gap_statistics
+from markerscope.solver.cleaning.gaps import Filled, FillSettings
+from markerscope.solver.cleaning.outliers import OutlierSettings, find_outliers
+from markerscope.solver.cleaning.request import Method, OutlierMethod
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.plain import json_text
+from markerscope.solver.core.progress import Progress, silent
+from markerscope.solver.core.request import Outcome
 
 RATE = 60.0
 """Hz that gaps are filled at."""
@@ -116,7 +116,7 @@ def _said(header: dict[str, Any]) -> str:
 
 def read_recordings(folder: Path) -> tuple[list[tuple[str, np.ndarray, float]], tuple[str, ...]]:
     """Name, (T, M, 3) m and rate of what can be used, and a sentence for what cannot."""
-    from solver.io import load_markers
+    from markerscope.solver.io import load_markers
 
     found, left_out = [], []
     files = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in (".c3d", ".trc", ".csv")]

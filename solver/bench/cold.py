@@ -1,4 +1,5 @@
-"""A method in a fresh process, from the start of Python to the answer: ``python -m solver.bench.cold FILE METHOD N``.
+"""A method in a fresh process, from the start of Python to the answer: ``python -m markerscope.solver.bench.cold FILE
+METHOD N``.
 
 N caps the iterations, 0 does not.
 """
@@ -15,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from solver.bench.execute import Run, given_of
-from solver.bench.methods import Given, Labels
-from solver.bench.registry import method_named
-from solver.errors import MarkerscopeError
-from solver.markers import Markers
-from solver.prior import PosePrior
+from markerscope.solver.bench.execute import Run, given_of
+from markerscope.solver.bench.methods import Given, Labels
+from markerscope.solver.bench.registry import method_named
+from markerscope.solver.core.errors import MarkerscopeError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.prior import PosePrior
 
 
 def cold_seconds(run: Run) -> float | None:
@@ -29,8 +30,8 @@ def cold_seconds(run: Run) -> float | None:
     with tempfile.TemporaryDirectory(prefix="markerscope-") as folder:
         path = Path(folder) / "session.npz"
         _write(path, given)
-        words = [sys.executable, "-m", "solver.bench.cold", str(path), run.method, str(run.iterations or 0)]
-        root = str(Path(__file__).parents[2])
+        words = [sys.executable, "-m", "markerscope.solver.bench.cold", str(path), run.method, str(run.iterations or 0)]
+        root = str(Path(__file__).parents[3])
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join([root, *sys.path[1:]])}
         start = time.perf_counter()
         try:

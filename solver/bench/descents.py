@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from statistics import median
 
-from solver.bench.table import Record, line
+from markerscope.solver.bench.table import Record, line
 
 
 def descents_of(records: Sequence[Record]) -> str:

@@ -14,15 +14,15 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from solver.bench.cases import Case
-from solver.bench.measure import measure, steps
-from solver.bench.methods import Given, Labels, Variant
-from solver.bench.motions import MotionSource, find_motions, read_source
-from solver.bench.registry import method_named
-from solver.errors import MarkerscopeError
-from solver.pipeline.source import Changed
-from solver.progress import Progress
-from solver.synth.session import SynthSession, SynthSettings, synthesise
+from markerscope.solver.bench.cases import Case
+from markerscope.solver.bench.measure import measure, steps
+from markerscope.solver.bench.methods import Given, Labels, Variant
+from markerscope.solver.bench.motions import MotionSource, find_motions, read_source
+from markerscope.solver.bench.registry import method_named
+from markerscope.solver.core.errors import MarkerscopeError
+from markerscope.solver.core.progress import Progress
+from markerscope.solver.pipeline.source import Changed
+from markerscope.solver.synth.session import SynthSession, SynthSettings, synthesise
 
 _WARM_UP = SynthSettings(markers=12, frames=60)
 _warm: set[str] = set()

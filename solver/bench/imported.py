@@ -10,19 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from solver.bench.methods import Given, Solve, Solved, Variant
-from solver.errors import InputError
-from solver.io.atomic import make_folder
-from solver.io.export_c3d import write_c3d
-from solver.io.export_smpl import write_smpl_npz
-from solver.markers import Markers
-from solver.posed import Posed, imported_result
-from solver.progress import Progress, silent
-from solver.rotations import log_so3
-from solver.solve.results import CameraResult, FittedMotion
+from markerscope.solver.bench.methods import Given, Solve, Solved, Variant
+from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.progress import Progress, silent
+from markerscope.solver.core.rotations import log_so3
+from markerscope.solver.evaluate.posed import Posed, imported_result
+from markerscope.solver.fit.results import FittedMotion
+from markerscope.solver.io.atomic import make_folder
+from markerscope.solver.io.export_c3d import write_c3d
+from markerscope.solver.io.export_smpl import write_smpl_npz
 
 _ENDS = (".npz", "_stageii.pkl", "_stageii.npz", ".pkl", "")
-_CODE = ("body", "posed.py", "bench/imported.py", "io/motion_in.py", "io/motion_layouts.py")
+_CODE = ("core", "body", "evaluate/posed.py", "bench/imported.py", "io/motion_in.py", "io/motion_layouts.py")
 _LOOKS = 20
 """Frames, evenly spread, by which markers are given to the skin below them."""
 

@@ -6,9 +6,9 @@ import ast
 from functools import cache
 from pathlib import Path
 
-from solver.bench.execute import Run
-from solver.body.model import EMBEDDED
-from solver.pipeline.digest import canonical, digest_of, file_digest
+from markerscope.solver.bench.execute import Run
+from markerscope.solver.body.model import EMBEDDED
+from markerscope.solver.pipeline.digest import canonical, digest_of, file_digest
 
 VERSION = 1
 """To be raised when the same code and settings are measured otherwise."""

@@ -6,7 +6,7 @@ import os
 import platform
 from pathlib import Path
 
-from solver.parallel import cores
+from markerscope.solver.core.parallel import cores
 
 
 def machine() -> dict[str, object]:

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from solver.bench.methods import Alternative, Solved
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS, PARENTS, PARTS
-from solver.evaluate import Evaluation, Posed, compare
-from solver.markers import Markers
-from solver.solve.results import FittedMotion
-from solver.synth.session import SynthSession
+from markerscope.solver.bench.methods import Alternative, Solved
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.skeleton import INDEX, JOINTS, PARENTS, PARTS
+from markerscope.solver.evaluate.evaluate import Evaluation, Posed, compare
+from markerscope.solver.fit.results import FittedMotion
+from markerscope.solver.synth.session import SynthSession
 
 RIGHT_SHARE = 0.8
 """Part of the markers that must sit on the right part."""

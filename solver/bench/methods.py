@@ -13,25 +13,24 @@ from typing import Any
 
 import numpy as np
 
-from solver.body.model import Body
-from solver.errors import InputError
-from solver.markers import Markers
-from solver.pipeline.inputs import SyncSettings
-from solver.pipeline.methods import GRAPHS
-from solver.pipeline.request import Method
-from solver.prior import PosePrior
-from solver.progress import Progress, silent
-from solver.solve.paper.results import PaperSolve
-from solver.solve.paper.settings import PaperLocalizeSettings, PaperSolveSettings
-from solver.solve.results import FittedMotion, Orientation
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.core.progress import Progress, silent
+from markerscope.solver.core.request import Method
+from markerscope.solver.fit.published.results import PaperSolve
+from markerscope.solver.fit.published.settings import PaperLocalizeSettings, PaperSolveSettings
+from markerscope.solver.fit.results import FittedMotion, Orientation
+from markerscope.solver.pipeline.inputs import SyncSettings
+from markerscope.solver.pipeline.methods import GRAPHS
 
 _UNSURE = 0.5
 """Below this confidence in the offset a solve asks its user for it."""
-SHARED_CODE = ("body", "clean", "markers.py", "prior.py", "prior_fill.py", "rotations.py", "sync.py", "video/shadow.py",
-           "video/lift.py", "segment.py", "affinity.py", "localize.py", "solve/*.py", "pipeline/fitting.py",
+SHARED_CODE = ("core", "body", "cleaning", "sync", "clustering", "fit/*.py", "pipeline/fitting.py",
            "pipeline/stages.py", "pipeline/inputs.py", "pipeline/cleaning.py")  # fmt: skip
 NEURAL_CODE = (*SHARED_CODE, "neural", "pipeline/stages_neural.py")
-PAPER_CODE = (*SHARED_CODE, "solve/paper", "pipeline/stages_paper.py")
+PAPER_CODE = (*SHARED_CODE, "fit/published", "pipeline/stages_paper.py")
 
 
 @dataclass(frozen=True)
@@ -153,8 +152,8 @@ def neural(given: Given, settings: Mapping[str, Any], progress: Progress = silen
 
 def registration(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
     """The video's pose, set rigidly on the markers: the paper's baseline."""
-    from solver.pipeline.fitting import scene
-    from solver.solve.registration import register
+    from markerscope.solver.fit.published.registration import register
+    from markerscope.solver.pipeline.fitting import scene
 
     results, seconds = run_stages("paper", given, settings, "localize", progress)
     start = time.perf_counter()
@@ -167,8 +166,8 @@ def registration(given: Given, settings: Mapping[str, Any], progress: Progress =
 
 def labelled(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
     """A fit that is told the vertex below every marker, as MoSh++ is; it looks at no video."""
-    from solver.body.bones import with_bone_lengths
-    from solver.solve.labelled.solve import solve_labelled
+    from markerscope.solver.body.bones import with_bone_lengths
+    from markerscope.solver.fit.labelled.solve import solve_labelled
 
     if given.labels is None:
         raise ValueError("a labelled method needs labels")
@@ -236,7 +235,7 @@ def _clock(run: Callable[..., Any], inputs: Mapping[str, Any], nominal: float) -
 
 def outcome(name: Method, results: Mapping[str, Any], seconds: Mapping[str, float]) -> Solved:
     """The answer of a method whose stages have all run."""
-    from solver.pipeline.fitting import scene
+    from markerscope.solver.pipeline.fitting import scene
 
     ranked: Orientation = results["orient"]
     found, motion, sync = results["localize"], results["fit"], results["sync"]
@@ -287,7 +286,7 @@ METHODS = (
         "labelled",
         "told the vertex below every marker: two stages as in MoSh++, without the video",
         labelled,
-        sources=(*SHARED_CODE, "solve/labelled"),
+        sources=(*SHARED_CODE, "fit/labelled"),
         needs_labels=True,
     ),
 )

@@ -10,11 +10,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.motion import SkeletonMotion
-from solver.pipeline.digest import digest_of, file_digest
-from solver.pipeline.source import changed
-from solver.synth.acts import ACTS
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.motion import SkeletonMotion
+from markerscope.solver.pipeline.digest import digest_of, file_digest
+from markerscope.solver.pipeline.source import changed
+from markerscope.solver.synth.acts import ACTS
 
 T = TypeVar("T")
 
@@ -94,9 +94,9 @@ def read_source(source: MotionSource) -> SkeletonMotion | str:
 
 def _read(path: Path, skeleton: Path | None) -> SkeletonMotion:
     if skeleton is not None:
-        from solver.io.asf_amc import read_asf_amc
+        from markerscope.solver.io.asf_amc import read_asf_amc
 
         return read_asf_amc(skeleton, path)
-    from solver.io.bvh import read_bvh
+    from markerscope.solver.io.bvh import read_bvh
 
     return read_bvh(path)

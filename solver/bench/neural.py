@@ -11,19 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from solver import __version__
-from solver.bench.machine import machine
-from solver.bench.neural_exam import Recording, examined, recordings
-from solver.bench.request import BenchRequest
-from solver.bench.runner import write_tables
-from solver.body.model import Body
-from solver.errors import InputError
-from solver.io.atomic import make_folder, write_text_atomic
-from solver.neural.library import KINDS, Clip, by_kind, load_library
-from solver.pipeline.digest import digest_of, file_digest
-from solver.pipeline.request import Outcome
-from solver.plain import json_text
-from solver.progress import Progress, part_of, silent
+from markerscope.solver import __version__
+from markerscope.solver.bench.machine import machine
+from markerscope.solver.bench.neural_exam import Recording, examined, recordings
+from markerscope.solver.bench.request import BenchRequest
+from markerscope.solver.bench.runner import write_tables
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.plain import json_text
+from markerscope.solver.core.progress import Progress, part_of, silent
+from markerscope.solver.core.request import Outcome
+from markerscope.solver.io.atomic import make_folder, write_text_atomic
+from markerscope.solver.neural.training.library import KINDS, Clip, by_kind, load_library
+from markerscope.solver.pipeline.digest import digest_of, file_digest
 
 MINUTES = 8.0
 """Of training of each network, where nothing else is said."""
@@ -106,8 +106,8 @@ def neural_suite(request: BenchRequest, progress: Progress = silent) -> Outcome:
     ------
     InputError : a folder or a row that there is not, or torch is not installed
     """
-    from solver.bench.neural_rows import ENTRIES
-    from solver.neural.agnostic_solve import SHIPPED, require_torch
+    from markerscope.solver.bench.neural_rows import ENTRIES
+    from markerscope.solver.neural.layout_free.agnostic_solve import SHIPPED, require_torch
 
     require_torch()
     entries = [entry for entry in ENTRIES if not request.cases or entry.name in request.cases]
@@ -138,7 +138,7 @@ def neural_suite(request: BenchRequest, progress: Progress = silent) -> Outcome:
 
 def ground_of(request: BenchRequest, folder: Path) -> Ground:
     """Clips split into what is learnt from and what is examined on."""
-    from solver.neural.command import motions_of
+    from markerscope.solver.neural.training.library import motions_of
 
     if request.motions is not None and not request.motions.is_dir():
         raise InputError("there is no such folder", request.motions, "name a folder of BVH or AMC files")

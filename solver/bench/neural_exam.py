@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.body.model import Body, chain
-from solver.neural.agnostic_solve import Marked, Ready, solve_frames
-from solver.neural.layout import HEIGHT_M, Layout
-from solver.neural.library import Clip
-from solver.neural.metrics import joe, jpe
-from solver.synth.placement import MARKERS_PER_BONE, place_markers
+from markerscope.solver.body.model import Body, chain
+from markerscope.solver.neural.layout import HEIGHT_M, Layout
+from markerscope.solver.neural.layout_free.agnostic_solve import Marked, Ready, solve_frames
+from markerscope.solver.neural.metrics import joe, jpe
+from markerscope.solver.neural.training.library import Clip
+from markerscope.solver.synth.placement import MARKERS_PER_BONE, place_markers
 
 FRAMES = 64
 """Of a recording."""
@@ -53,7 +53,7 @@ Answer = Callable[[Recording], tuple[np.ndarray, np.ndarray]]
 
 def recordings(body: Body, layout: Layout, clips: Sequence[Clip], count: int, seed: int) -> list[Recording]:
     """Each of another body outside of what the shape coefficients reach, and of another moment of the clips."""
-    from solver.neural.examples import ExampleSettings, Sampler, body_pool, generator
+    from markerscope.solver.neural.training.examples import ExampleSettings, Sampler, body_pool, generator
 
     bodies = body_pool(body, count, seed, plain=False)
     found = []
@@ -88,7 +88,7 @@ def examined(answer: Answer, exam: Sequence[Recording]) -> Score:
 
 def agnostic_answer(ready: Ready, body: Body | None = None) -> Answer:
     """The layout-agnostic network's, told of the body; refined on the markers where a body model is given."""
-    from solver.neural.agnostic_refine import refine
+    from markerscope.solver.neural.layout_free.agnostic_refine import refine
 
     def answer(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
         found = solve_frames(ready, recording.markers, recording.told)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from solver.bench.neural import TUNING_MINUTES, Entry, Ground, Row, exams, scored
-from solver.bench.neural_exam import Recording, agnostic_answer, new_layout
-from solver.neural.train import TrainSettings
-from solver.progress import Progress
+from markerscope.solver.bench.neural import TUNING_MINUTES, Entry, Ground, Row, exams, scored
+from markerscope.solver.bench.neural_exam import Recording, agnostic_answer, new_layout
+from markerscope.solver.core.progress import Progress
+from markerscope.solver.neural.training.train import TrainSettings
 
 
 def _training(minutes: float, seed: int) -> TrainSettings:
@@ -19,11 +19,11 @@ def _graph(about: str, layout_name: str, **chosen: Any) -> Any:
     """The network on a graph of markers and joints, or Holden's, on a named layout."""
 
     def run(ground: Ground, minutes: float, key: str, progress: Progress) -> list[Row]:
-        from solver.neural.build import Choice
-        from solver.neural.layout import named_layout
-        from solver.neural.library import RATE
-        from solver.neural.named import solve, train_solver
-        from solver.neural.solving import samplers
+        from markerscope.solver.neural.layout import named_layout
+        from markerscope.solver.neural.per_layout.build import Choice
+        from markerscope.solver.neural.per_layout.named import solve, train_solver
+        from markerscope.solver.neural.per_layout.solving import samplers
+        from markerscope.solver.neural.training.library import RATE
 
         layout = named_layout(ground.body, layout_name)  # type: ignore[arg-type]
         both = samplers(ground.body, ground.learnt, ground.seen, seed=ground.seed)
@@ -50,8 +50,8 @@ def _graph(about: str, layout_name: str, **chosen: Any) -> Any:
 
 def _shipped(ground: Ground, minutes: float, key: str, progress: Progress) -> list[Row]:
     """As it ships, on a named layout and on a new one, and refined."""
-    from solver.neural.agnostic_solve import load
-    from solver.neural.layout import named_layout
+    from markerscope.solver.neural.layout import named_layout
+    from markerscope.solver.neural.layout_free.agnostic_solve import load
 
     ready = load()
     rows = []
@@ -68,14 +68,14 @@ def _shipped(ground: Ground, minutes: float, key: str, progress: Progress) -> li
 
 def _tuned(ground: Ground, minutes: float, key: str, progress: Progress) -> list[Row]:
     """A minute on the new layout."""
-    from solver.neural.agnostic_solve import load
+    from markerscope.solver.neural.layout_free.agnostic_solve import load
 
     return _on_new(ground, minutes, key, progress, load(), "agnostic, tuned to the layout", True)
 
 
 def _scratch(ground: Ground, minutes: float, key: str, progress: Progress) -> list[Row]:
     """The same minute without what was learnt before."""
-    from solver.neural.agnostic_solve import load
+    from markerscope.solver.neural.layout_free.agnostic_solve import load
 
     ready = load()
     new = replace(ready, params=ready.network.initial(ground.seed))
@@ -85,8 +85,8 @@ def _scratch(ground: Ground, minutes: float, key: str, progress: Progress) -> li
 def _on_new(
     ground: Ground, minutes: float, key: str, progress: Progress, ready: Any, about: str, refined: bool
 ) -> list[Row]:
-    from solver.neural.finetune import TUNING, finetune
-    from solver.neural.finetune import Ground as Tuned
+    from markerscope.solver.neural.layout_free.finetune import TUNING, finetune
+    from markerscope.solver.neural.layout_free.finetune import Ground as Tuned
 
     layout = new_layout(ground.body, ground.seed)
     seconds = 60 * min(TUNING_MINUTES, minutes)
@@ -113,11 +113,11 @@ def _fills(about: str, filled_first: bool) -> Any:
     """The occlusion network, on gaps of heavy-tailed lengths; OMPE of it and of the filling by distances alone."""
 
     def run(ground: Ground, minutes: float, key: str, progress: Progress) -> list[Row]:
-        from solver.neural.filling import FillTask, fill_bank, new_occlusion
-        from solver.neural.layout import named_layout
-        from solver.neural.occlusion import COMPACT_HIDDEN
-        from solver.neural.solving import samplers
-        from solver.neural.train import train
+        from markerscope.solver.neural.layout import named_layout
+        from markerscope.solver.neural.per_layout.filling import FillTask, fill_bank, new_occlusion
+        from markerscope.solver.neural.per_layout.occlusion import COMPACT_HIDDEN
+        from markerscope.solver.neural.per_layout.solving import samplers
+        from markerscope.solver.neural.training.train import train
 
         layout = named_layout(ground.body, "full_body")
         rest = layout.rest(ground.body)
@@ -154,7 +154,7 @@ _BATCH = 96
 
 def _sizes(**changed: Any) -> Any:
     """Those for a training of a few minutes."""
-    from solver.neural.heterogeneous import COMPACT
+    from markerscope.solver.neural.per_layout.heterogeneous import COMPACT
 
     return replace(COMPACT, **changed)
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from solver.bench.ablations import ablations
-from solver.bench.imported import outside
-from solver.bench.methods import METHODS, Variant
-from solver.errors import InputError
+from markerscope.solver.bench.ablations import ablations
+from markerscope.solver.bench.imported import outside
+from markerscope.solver.bench.methods import METHODS, Variant
+from markerscope.solver.core.errors import InputError
 
 VARIANTS: dict[str, Variant] = {variant.name: variant for variant in (*METHODS, *ablations())}
 

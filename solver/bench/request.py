@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from solver.errors import InputError
+from markerscope.solver.core.errors import InputError
 
 OUT = Path("bench-out")
 

@@ -13,11 +13,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from solver.bench.execute import Run, execute
-from solver.io.atomic import make_folder, write_text_atomic
-from solver.io.together import together
-from solver.plain import json_text
-from solver.progress import Progress, silent
+from markerscope.solver.bench.execute import Run, execute
+from markerscope.solver.core.plain import json_text
+from markerscope.solver.core.progress import Progress, silent
+from markerscope.solver.io.atomic import make_folder, write_text_atomic
+from markerscope.solver.io.together import together
 
 _THREADS = (
     "OMP_NUM_THREADS",

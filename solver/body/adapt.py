@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solver.body.model import Body
-from solver.body.skeleton import PARENTS
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.skeleton import PARENTS
 
 
 def load_smpl(path: str | Path) -> Body:
     """The body in a user's ``SMPL_*.npz`` or ``.pkl``."""
-    from solver.body.smpl_file import read_smpl_file
+    from markerscope.solver.body.smpl_file import read_smpl_file
 
     data = read_smpl_file(path)
     template, regressor = data["v_template"], data["J_regressor"]

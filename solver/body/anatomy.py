@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from solver.body.skeleton import INDEX
+from markerscope.solver.core.skeleton import INDEX
 
 UPRIGHT = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])
 """The frame of a segment that stands square in the rest pose: X forward, Y up, Z right."""

@@ -12,10 +12,10 @@ from functools import cache
 
 import numpy as np
 
-from resources import resource
-from solver.body.model import Body, chain
-from solver.body.skeleton import INDEX, JOINTS
-from solver.errors import InputError
+from markerscope.resources import resource
+from markerscope.solver.body.model import Body, chain
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.skeleton import INDEX, JOINTS
 
 FILE = resource("body", "bones.npz")
 STIFFNESS = 0.3

@@ -11,8 +11,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, descendants
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.skeleton import INDEX, descendants
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.body.model import Body, normals_at
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.meshes import normals_at
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from resources import resource
-from solver.body.skeleton import JOINTS, PARENTS
-from solver.errors import InputError
+from markerscope.resources import resource
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.meshes import vertex_normals
+from markerscope.solver.core.skeleton import JOINTS, PARENTS
 
 EMBEDDED = resource("body", "anny_24.npz")
 
@@ -68,7 +69,7 @@ class Body:
     def load(cls, path: str | Path | None = None) -> Body:
         """The embedded body, or the one in a user's ``SMPL_*.npz`` or ``.pkl``."""
         if path is not None and Path(path).resolve() != EMBEDDED.resolve():
-            from solver.body.adapt import load_smpl
+            from markerscope.solver.body.adapt import load_smpl
 
             return load_smpl(path)
         return _embedded()
@@ -233,25 +234,6 @@ def chain(rotations: Any, rest_joints: Any, trans: Any) -> tuple[Any, Any]:
         place.append(place[parent] + turn[parent] @ bone)
     stack = np.stack if isinstance(rotations, np.ndarray) else _torch_stack
     return stack(turn, 1), stack(place, 1)
-
-
-def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(V, 3) area-weighted outward unit normals of one mesh (V, 3)."""
-    a, b, c = vertices.T[:, faces.T].swapaxes(0, 1)
-    u, v = b - a, c - a
-    face = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
-    corners = faces.ravel()
-    total = np.stack([np.bincount(corners, np.repeat(one, 3), minlength=len(vertices)) for one in face], axis=1)
-    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
-
-
-def normals_at(vertices: np.ndarray, faces: np.ndarray, around: np.ndarray) -> np.ndarray:
-    """(n, 3) the same at some vertices of the mesh, whose faces ``around`` (n, K) lists; -1 = none."""
-    wanted, place = np.unique(around, return_inverse=True)
-    a, b, c = vertices[faces[wanted]].swapaxes(0, 1)
-    face = np.cross(b - a, c - a) * (wanted >= 0)[:, None]
-    total = face[place.reshape(around.shape)].sum(axis=1)
-    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
 
 
 def _torch_stack(tensors: list[Any], dim: int) -> Any:

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from solver.body.skeleton import JOINTS, PARENTS
-from solver.errors import InputError
-from solver.io.safe_pickle import Sparse, load_untrusted
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.skeleton import JOINTS, PARENTS
+from markerscope.solver.safe_pickle import Sparse, load_untrusted
 
 SHAPES = 10
 """Shape coefficients that are used; some files carry 300."""

@@ -10,9 +10,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from solver.datasets.recording import Film
-from solver.errors import InputError
-from solver.io.atomic import atomic_path
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.datasets.recording import Film
+from markerscope.solver.io.atomic import atomic_path
 
 if TYPE_CHECKING:
     from av import VideoFrame
@@ -25,7 +25,7 @@ _UNPACK = "download it again"
 def timing(film: Film) -> tuple[float, int]:
     """Rate in Hz and number of frames of a film; 0 frames where its container does not say."""
     if not film.camera:
-        from solver.video.frames import announced
+        from markerscope.solver.video.frames import announced
 
         rate, count = announced(film.path)
         return film.rate or rate, count
@@ -72,7 +72,7 @@ def _frames(film: Film, first: int, last: int) -> Iterator[VideoFrame]:
     import av
 
     if not film.camera:
-        from solver.video.frames import read_frames
+        from markerscope.solver.video.frames import read_frames
 
         for _, _, picture in read_frames(film.path, range(first, last)):
             yield av.VideoFrame.from_ndarray(picture, format="rgb24")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from solver.datasets.recording import (
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.datasets.recording import (
     Dataset,
     Film,
     Recording,
@@ -13,8 +14,7 @@ from solver.datasets.recording import (
     side_by_side,
     subfolders,
 )
-from solver.datasets.request import Options
-from solver.errors import InputError
+from markerscope.solver.datasets.request import Options
 
 CAMERA = "7151062"
 BACKPACK = ("LBWT", "NEWLBAC", "NEWRBAC", "RBAC", "RBWT", "T10", "T8")
@@ -44,7 +44,7 @@ def find(folder: Path, options: Options) -> tuple[Recording, ...]:
 
 def cook_of(path: Path) -> str | None:
     """The subject who cooks; objects are listed as subjects, too."""
-    from solver.io.markers_in import list_subjects
+    from markerscope.solver.io.markers_in import list_subjects
 
     subjects = list_subjects(path)
     if not subjects:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from solver.datasets.recording import (
+from markerscope.solver.datasets.recording import (
     Dataset,
     Film,
     Recording,
@@ -12,7 +12,7 @@ from solver.datasets.recording import (
     not_as_expected,
     side_by_side,
 )
-from solver.datasets.request import Options
+from markerscope.solver.datasets.request import Options
 
 CAMERA = "YOGI_Cam_06"
 SESSIONS = ("20220923_20220926_with_hands", "20221004_with_com")

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from solver.datasets.request import Options
-from solver.errors import InputError
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.datasets.request import Options
 
 RATE = 30.0
 """Hz, what Milef et al. (2024) bring every dataset to."""

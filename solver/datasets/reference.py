@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.export_smpl import write_smpl_npz
-from solver.io.motion_in import read_motion
-from solver.markers import Markers
-from solver.metrics import points_at, rotations_at
-from solver.rotations import log_so3
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.metrics import points_at, rotations_at
+from markerscope.solver.core.rotations import log_so3
+from markerscope.solver.io.export_smpl import write_smpl_npz
+from markerscope.solver.io.motion_in import read_motion
 
 
 def write_reference(out: Path, source: Path | None, markers: Markers) -> tuple[bool, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from solver.datasets.recording import (
+from markerscope.solver.datasets.recording import (
     Dataset,
     Film,
     Recording,
@@ -13,7 +13,7 @@ from solver.datasets.recording import (
     side_by_side,
     subfolders,
 )
-from solver.datasets.request import Options
+from markerscope.solver.datasets.request import Options
 
 CAMERA = "l"
 """The left one of front, side, right and left (table 6 of Milef et al. 2024)."""

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.datasets.recording import RATE
-from solver.markers import Markers
-from solver.metrics import points_at
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.metrics import points_at
+from markerscope.solver.datasets.recording import RATE
 
 _SLACK = 1e-6
 

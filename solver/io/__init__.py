@@ -1,5 +1,5 @@
 """Reading and writing files: one module a format."""
 
-from solver.io.markers_in import list_subjects, load_markers
+from markerscope.solver.io.markers_in import list_subjects, load_markers
 
 __all__ = ["list_subjects", "load_markers"]

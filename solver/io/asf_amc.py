@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.motion import SkeletonMotion, euler_matrix
-from solver.io.text import decode, read_bytes, split_lines
-from solver.markers import UpAxis, lab_rotation
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import UpAxis, lab_rotation
+from markerscope.solver.io.motion import SkeletonMotion, euler_matrix
+from markerscope.solver.io.text import decode, read_bytes, split_lines
 
 _INCH = 0.0254
 _DOF = {"tx", "ty", "tz", "rx", "ry", "rz", "l"}

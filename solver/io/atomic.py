@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from solver.errors import InputError
-from solver.plain import shown
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.plain import shown
 
 _REASONS = {
     errno.ENOSPC: ("the disk is full", "free some space or choose another disk"),

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.motion import SkeletonMotion, euler_matrix
-from solver.io.text import decode, read_bytes
-from solver.markers import UpAxis, lab_rotation
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import UpAxis, lab_rotation
+from markerscope.solver.io.motion import SkeletonMotion, euler_matrix
+from markerscope.solver.io.text import decode, read_bytes
 
 _MOST_JOINTS = 2000
 

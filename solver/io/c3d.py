@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.io.c3d_format import C3DContent, decode_c3d
-from solver.io.raw import RawMarkers
-from solver.io.text import read_bytes
-from solver.markers import UpAxis
+from markerscope.solver.core.markers import UpAxis
+from markerscope.solver.io.c3d_format import C3DContent, decode_c3d
+from markerscope.solver.io.raw import RawMarkers
+from markerscope.solver.io.text import read_bytes
 
 _MODEL_OUTPUTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "MODELED_MARKERS")
 _OWN_GROUPS = ("POINT", "ANALOG", "TRIAL", "FORCE_PLATFORM", "EVENT", "MANUFACTURER", "?")

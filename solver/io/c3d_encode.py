@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from solver.io.c3d_format import BLOCK
+from markerscope.solver.io.c3d_format import BLOCK
 
 Value = tuple[str, ...] | np.ndarray
 """Text, or numbers: integers are written as 16 bits, others as floats."""

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.c3d_layout import Header, Layout, find_layout, first_frame, point_words, read_header
-from solver.io.c3d_parameters import BLOCK, Section, read_section
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.c3d_layout import Header, Layout, find_layout, first_frame, point_words, read_header
+from markerscope.solver.io.c3d_parameters import BLOCK, Section, read_section
 
 
 @dataclass(frozen=True)

@@ -9,18 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.atomic import write_bytes_atomic
-from solver.io.c3d import read_c3d
-from solver.io.c3d_encode import MEASURED_WORD
-from solver.io.c3d_format import C3DContent, decode_c3d
-from solver.io.c3d_layout import Layout, point_words, trial_range
-from solver.io.c3d_parameters import BLOCK, DEC, from_floats, section_bytes, with_numbers, with_texts
-from solver.io.labels import unique
-from solver.io.markers_in import is_c3d, markers_of
-from solver.io.text import read_bytes
-from solver.io.units import metres_per_unit, settle_units
-from solver.markers import Markers
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.io.atomic import write_bytes_atomic
+from markerscope.solver.io.c3d import read_c3d
+from markerscope.solver.io.c3d_encode import MEASURED_WORD
+from markerscope.solver.io.c3d_format import C3DContent, decode_c3d
+from markerscope.solver.io.c3d_layout import Layout, point_words, trial_range
+from markerscope.solver.io.c3d_parameters import BLOCK, DEC, from_floats, section_bytes, with_numbers, with_texts
+from markerscope.solver.io.labels import unique
+from markerscope.solver.io.markers_in import is_c3d, markers_of
+from markerscope.solver.io.text import read_bytes
+from markerscope.solver.io.units import metres_per_unit, settle_units
 
 _LABEL_BYTES = 120
 _SAME = 1e-5
@@ -261,7 +261,7 @@ def kept_or_plain(
     ------
     InputError : the file cannot be written
     """
-    from solver.io.export_c3d import write_c3d
+    from markerscope.solver.io.export_c3d import write_c3d
 
     if original is not None:
         try:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.c3d_parameters import BLOCK, DEC, Section, floats
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.c3d_parameters import BLOCK, DEC, Section, floats
 
 _LIMIT = 65535
 _SMOOTHER = 3.0

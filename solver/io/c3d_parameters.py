@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
+from markerscope.solver.core.errors import InputError
 
 BLOCK = 512
 INTEL, DEC, MIPS = 84, 85, 86

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.atomic import write_text_atomic
-from solver.io.text import read_bytes
-from solver.plain import json_text
-from solver.solve.results import CameraResult
+from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.plain import json_text
+from markerscope.solver.io.atomic import write_text_atomic
+from markerscope.solver.io.text import read_bytes
 
 FILE_NAME = "camera.json"
 _REMEDY = "name the result folder of a solve with a video, or its camera.json"

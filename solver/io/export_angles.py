@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from solver.angles import JointAngles
-from solver.io.atomic import write_text_atomic
-from solver.plain import json_text
+from markerscope.solver.angles.angles import JointAngles
+from markerscope.solver.core.plain import json_text
+from markerscope.solver.io.atomic import write_text_atomic
 
 AS_RECORDED = "angles_as_recorded.csv"
 """The file beside ``angles.csv`` where that is relative to a neutral pose."""
@@ -31,7 +31,7 @@ def write_angles(
     Parameters
     ----------
     provenance : program version, digests of the inputs, settings of every stage
-    evidence : what each angle rests on, by column name, as ``solver.angles.evidence`` gives it
+    evidence : what each angle rests on, by column name, as ``markerscope.solver.angles.angles.evidence`` gives it
     """
     folder = Path(folder)
     relative = angles.zero == "neutral"

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.io.atomic import write_text_atomic
-from solver.io.labels import unique
-from solver.markers import lab_rotation
+from markerscope.solver.core.markers import lab_rotation
+from markerscope.solver.io.atomic import write_text_atomic
+from markerscope.solver.io.labels import unique
 
 _CHANNELS = "Zrotation Xrotation Yrotation"
 _END_SITE_CM = 5.0

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.atomic import write_bytes_atomic
-from solver.io.c3d_encode import MEASURED_WORD, MOST_PER_PARAMETER, Value, encode_c3d
-from solver.io.file_axes import in_file_axes
-from solver.io.labels import unique
-from solver.markers import Markers, UpAxis
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers, UpAxis
+from markerscope.solver.io.atomic import write_bytes_atomic
+from markerscope.solver.io.c3d_encode import MEASURED_WORD, MOST_PER_PARAMETER, Value, encode_c3d
+from markerscope.solver.io.file_axes import in_file_axes
+from markerscope.solver.io.labels import unique
 
 _LABEL_BYTES = 120
 _RESIDUAL_MM = 0.1  # C3D wants a positive residual for measured points; the true one is not known

@@ -9,10 +9,10 @@ from typing import Literal
 
 import numpy as np
 
-from solver.io.atomic import write_text_atomic
-from solver.io.file_axes import in_file_axes
-from solver.io.labels import unique
-from solver.markers import Markers, UpAxis
+from markerscope.solver.core.markers import Markers, UpAxis
+from markerscope.solver.io.atomic import write_text_atomic
+from markerscope.solver.io.file_axes import in_file_axes
+from markerscope.solver.io.labels import unique
 
 
 def write_markers_csv(

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.io.atomic import write_text_atomic
-from solver.io.labels import unique
+from markerscope.solver.io.atomic import write_text_atomic
+from markerscope.solver.io.labels import unique
 
 
 def write_mot(

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.atomic import atomic_path
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.atomic import atomic_path
 
 
 def write_smpl_npz(

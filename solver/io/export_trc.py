@@ -9,11 +9,11 @@ from typing import Literal
 
 import numpy as np
 
-from solver.io.atomic import write_text_atomic
-from solver.io.file_axes import in_file_axes
-from solver.io.filled_list import write_filled_list
-from solver.io.labels import unique
-from solver.markers import Markers
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.io.atomic import write_text_atomic
+from markerscope.solver.io.file_axes import in_file_axes
+from markerscope.solver.io.filled_list import write_filled_list
+from markerscope.solver.io.labels import unique
 
 _KEYS = "DataRate CameraRate NumFrames NumMarkers Units OrigDataRate OrigDataStartFrame OrigNumFrames".split()
 

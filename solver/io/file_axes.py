@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.markers import Markers, UpAxis, lab_rotation
+from markerscope.solver.core.markers import Markers, UpAxis, lab_rotation
 
 _AXES: tuple[UpAxis, UpAxis, UpAxis] = ("x", "y", "z")
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.atomic import cannot_write, write_text_atomic
-from solver.io.raw import RawMarkers
-from solver.io.text import decode, read_bytes, split_lines
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.atomic import cannot_write, write_text_atomic
+from markerscope.solver.io.raw import RawMarkers
+from markerscope.solver.io.text import decode, read_bytes, split_lines
 
 _TITLE = "marker,first_row,last_row"
 

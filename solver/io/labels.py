@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from solver.plain import shown
+from markerscope.solver.core.plain import shown
 
 _BONES = set(
     "HED LCL LFE LFO LHN LHU LRA LTI LTO PEL RCL RFE RFO RHN RHU RRA RTI RTO SPI THX TOR TRX BOX LTX RTX".split()

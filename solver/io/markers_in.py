@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.c3d import read_c3d
-from solver.io.c3d_format import looks_like_c3d
-from solver.io.filled_list import apply_filled_list
-from solver.io.labels import computed_by_name, prefix, subjects_of, unique, without_prefix
-from solver.io.raw import RawMarkers
-from solver.io.table import read_table
-from solver.io.text import decode, read_bytes
-from solver.io.trc import looks_like_trc, read_trc
-from solver.io.units import settle_units
-from solver.io.up_axis import settle_up
-from solver.markers import Markers, UpAxis
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers, UpAxis
+from markerscope.solver.io.c3d import read_c3d
+from markerscope.solver.io.c3d_format import looks_like_c3d
+from markerscope.solver.io.filled_list import apply_filled_list
+from markerscope.solver.io.labels import computed_by_name, prefix, subjects_of, unique, without_prefix
+from markerscope.solver.io.raw import RawMarkers
+from markerscope.solver.io.table import read_table
+from markerscope.solver.io.text import decode, read_bytes
+from markerscope.solver.io.trc import looks_like_trc, read_trc
+from markerscope.solver.io.units import settle_units
+from markerscope.solver.io.up_axis import settle_up
 
 _LEAST_HZ, _MOST_HZ = 1.0, 2000.0
 _LONGEST_S = 4 * 3600.0

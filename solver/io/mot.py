@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.text import decode, number_table, read_bytes, split_cells, split_lines
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.text import decode, number_table, read_bytes, split_cells, split_lines
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from solver.body.skeleton import JOINTS
-from solver.errors import InputError
-from solver.io.motion_layouts import as_amass, model_of
-from solver.io.priors.track import numbers, rotations_from_vectors
-from solver.io.safe_pickle import load_untrusted
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.skeleton import JOINTS
+from markerscope.solver.io.motion_layouts import as_amass, model_of
+from markerscope.solver.io.priors.track import numbers, rotations_from_vectors
+from markerscope.solver.safe_pickle import load_untrusted
 
 MOTION = "motion.npz"
 _RATES = ("mocap_frame_rate", "mocap_framerate", "fps")

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.atomic import atomic_path
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.atomic import atomic_path
 
 _QUALITY = "18"  # x264's constant rate factor: no loss that is seen
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.markers import UpAxis
+from markerscope.solver.core.markers import UpAxis
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.raw import RawMarkers
-from solver.io.table_columns import Columns, find_columns, find_long_columns
-from solver.io.table_long import widen
-from solver.io.table_sheet import Sheet, cut, times_of_day
-from solver.io.text import decode, is_number, number, number_table, read_bytes, split_lines, thousands_mark
-from solver.io.timeline import even_grid
-from solver.markers import UpAxis
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import UpAxis
+from markerscope.solver.io.raw import RawMarkers
+from markerscope.solver.io.table_columns import Columns, find_columns, find_long_columns
+from markerscope.solver.io.table_long import widen
+from markerscope.solver.io.table_sheet import Sheet, cut, times_of_day
+from markerscope.solver.io.text import decode, is_number, number, number_table, read_bytes, split_lines, thousands_mark
+from markerscope.solver.io.timeline import even_grid
 
 _RATES = ("rate", "export frame rate", "capture frame rate", "frequency", "datarate", "frame rate", "samplerate")
 _YES = ("1", "true", "yes", "t")

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from solver.io.units import metres_per_unit
+from markerscope.solver.io.units import metres_per_unit
 
 _AXIS = re.compile(r"([xyzXYZ])\d*\s*(?:[\[(]\s*([^\W\d]+)\s*[\])])?")
 _FLAT = re.compile(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from solver.errors import InputError
-from solver.io.table_columns import LongColumns
-from solver.io.table_sheet import Sheet
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.table_columns import LongColumns
+from markerscope.solver.io.table_sheet import Sheet
 
 
 def widen(sheet: Sheet, columns: LongColumns, path: str | Path) -> Sheet:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from solver.io.text import SEPARATORS, clock_seconds, is_number, number, refuse_ragged_blanks, split_cells
+from markerscope.solver.io.text import SEPARATORS, clock_seconds, is_number, number, refuse_ragged_blanks, split_cells
 
 _REMARK = ("#", "%", "//")
 _LOOK_AHEAD = 3

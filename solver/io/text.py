@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
+from markerscope.solver.core.errors import InputError
 
 SEPARATORS = "\t;,"
 _LOST = set(

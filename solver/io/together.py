@@ -14,8 +14,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from solver.errors import InputError
-from solver.io.atomic import cannot_write, make_folder
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.atomic import cannot_write, make_folder
 
 
 @contextmanager

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.raw import RawMarkers
-from solver.io.text import (
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.raw import RawMarkers
+from markerscope.solver.io.text import (
     decode,
     is_number,
     number,
@@ -22,7 +22,7 @@ from solver.io.text import (
     split_lines,
     thousands_mark,
 )
-from solver.io.timeline import even_grid
+from markerscope.solver.io.timeline import even_grid
 
 _AXIS = re.compile(r"[XYZxyz]\d*")
 

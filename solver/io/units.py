@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solver.errors import InputError
+from markerscope.solver.core.errors import InputError
 
 _METRES = {
     "m": 1.0, "meter": 1.0, "metre": 1.0,

@@ -6,8 +6,8 @@ import warnings
 
 import numpy as np
 
-from solver.io.raw import RawMarkers
-from solver.markers import UpAxis, lab_rotation
+from markerscope.solver.core.markers import UpAxis, lab_rotation
+from markerscope.solver.io.raw import RawMarkers
 
 _AXES: tuple[UpAxis, UpAxis, UpAxis] = ("x", "y", "z")
 _RARE_X = 3.0  # next to no lab has x up

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from solver.body.skeleton import INDEX
-from solver.neural.layout import Layout
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.neural.layout import Layout
 
 if TYPE_CHECKING:
     from torch import Tensor

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.clean.gap_model import GapModel, draw_gaps
+from markerscope.solver.cleaning.gap_model import GapModel, draw_gaps
 
 if TYPE_CHECKING:
     from torch import Generator, Tensor
@@ -71,8 +71,9 @@ def augmented(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A recording made worse.
 
-    Gaps are drawn by equation (6) as ``solver.clean.gap_model.draw_gaps`` has it: with the mean of the markers'
-    rates where the publication prints their sum, and with the fractions of a gap that rounding down loses drawn.
+    Gaps are drawn by equation (6) as ``markerscope.solver.cleaning.gap_model.draw_gaps`` has it: with the mean of the
+    markers' rates where the publication prints their sum, and with the fractions of a gap that rounding down loses
+    drawn.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.body.skeleton import PARENTS
+from markerscope.solver.core.skeleton import PARENTS
 
 SOLVING, FILLING = 3, 6
 """Neighbours of a marker in the networks that solve, and where gaps are filled (Pan et al. 2023, section 4)."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.body.skeleton import PARENTS
+from markerscope.solver.core.skeleton import PARENTS
 
 if TYPE_CHECKING:
     from torch import Tensor

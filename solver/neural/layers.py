@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.neural.graph import Links
+from markerscope.solver.neural.graph import Links
 
 if TYPE_CHECKING:
     from torch import Generator, Tensor

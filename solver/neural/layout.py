@@ -9,12 +9,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS
-from solver.errors import InputError
-from solver.solve.results import FittedMotion
-from solver.synth.layouts import LAYOUTS as PLACES
-from solver.synth.layouts import place_vertex
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.skeleton import INDEX, JOINTS
+from markerscope.solver.fit.results import FittedMotion
+from markerscope.solver.synth.layouts import LAYOUTS as PLACES
+from markerscope.solver.synth.layouts import place_vertex
 
 Group = Literal["body", "left_hand", "right_hand"]
 Name = Literal["full_body", "body_53", "body_hands"]
@@ -151,8 +151,8 @@ def session_layout(body: Body, fitted: FittedMotion, labels: Sequence[str], *, m
 
 def _blended_turns(body: Body, rotations: np.ndarray, vertex: np.ndarray) -> np.ndarray:
     """(T, M, 3, 3) how the skin at vertices is turned from rest, the nearest rotation to the blend."""
-    from solver.body.model import chain
-    from solver.clean.fill.frames import nearest_rotations
+    from markerscope.solver.body.model import chain
+    from markerscope.solver.cleaning.fill.frames import nearest_rotations
 
     turn, _ = chain(rotations, np.zeros((len(JOINTS), 3)), np.zeros((len(rotations), 3)))
     blended = np.einsum("mj,tjab->tmab", body.weights[vertex], turn)

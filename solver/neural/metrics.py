@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.body.skeleton import JOINTS
+from markerscope.solver.core.skeleton import JOINTS
 
 BODY = tuple(range(22))
 """The 22 joints that both papers call the body: all but the two that stand for the fingers."""

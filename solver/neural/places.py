@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from solver.body.model import Body
-from solver.errors import InputError
-from solver.neural.layout import Layout
-from solver.neural.weights import Card
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.neural.layout import Layout
+from markerscope.solver.neural.weights import Card
 
 _NEAR = 0.06
 """m on the mean body: a marker as far as this from a trained place is the same one, put on by another hand."""

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from solver.body.model import Body
-from solver.errors import InputError
-from solver.neural import agnostic_solve, agnostic_trust
-from solver.neural.agnostic_solve import Marked, Ready, Solved, held, solve_frames
-from solver.neural.places import check_places, columns_of
-from solver.neural.weights import Card, read_card
-from solver.progress import Progress, silent
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.progress import Progress, silent
+from markerscope.solver.neural.layout_free import agnostic_solve, agnostic_trust
+from markerscope.solver.neural.layout_free.agnostic_solve import Marked, Ready, Solved, held, solve_frames
+from markerscope.solver.neural.places import check_places, columns_of
+from markerscope.solver.neural.weights import Card, read_card
 
 if TYPE_CHECKING:
-    from solver.neural.named import Solver
+    from markerscope.solver.neural.per_layout.named import Solver
 
 _WINDOWS, _WINDOW = 8, 64
 """Spans of made motion that a network of one layout is tried on, and frames of each."""
@@ -66,7 +66,7 @@ class AnyLayout:
 
     def tuned(self, steps: int, progress: Progress = silent) -> AnyLayout:
         """Trained a little further."""
-        from solver.neural.finetune import Ground, tuned
+        from markerscope.solver.neural.layout_free.finetune import Ground, tuned
 
         return replace(self, ready=tuned(self.ready, Ground(self.body, person=self.person), steps, progress))
 
@@ -95,7 +95,7 @@ class OneLayout:
 
     def poses(self, markers: np.ndarray, rate: float, progress: Progress = silent) -> Solved:
         """What is lost is filled first; the bones it says are left aside, those of the person are known better."""
-        from solver.neural.named import solve
+        from markerscope.solver.neural.per_layout.named import solve
 
         progress(0.0, "the network solves")
         given = np.where((self.columns >= 0)[:, None], markers[:, self.columns], np.nan)
@@ -105,9 +105,9 @@ class OneLayout:
 
     def expected_errors(self) -> np.ndarray:
         """What it gets wrong on made motions of this body with these very markers, those missing that are."""
-        from solver.neural.agnostic_examples import Spoiling, one_person
-        from solver.neural.examples import generator
-        from solver.neural.library import RATE
+        from markerscope.solver.neural.layout_free.agnostic_examples import Spoiling, one_person
+        from markerscope.solver.neural.training.examples import generator
+        from markerscope.solver.neural.training.library import RATE
 
         motions = agnostic_trust.made_poses(self.body)
         spoiling = Spoiling(slide=5e-3, lost=0.05, far=0.0, place=0.0, joint=0.0)
@@ -147,7 +147,7 @@ def pose_network(path: Path | None, body: Body, person: Marked, vertex: np.ndarr
     ------
     InputError : the file holds no weights of a network that solves, or those for another layout or body
     """
-    from solver.neural import named
+    from markerscope.solver.neural.per_layout import named
 
     if path is not None and read_card(path).network == named.KIND:
         solver, card = named.load_solver(path)

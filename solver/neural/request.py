@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from solver.errors import InputError
+from markerscope.solver.core.errors import InputError
 
 Network = Literal["agnostic", "graph", "occlusion"]
 Size = Literal["compact", "published"]
 NETWORKS, SIZES = get_args(Network), get_args(Size)
 
 NAMED = ("full_body", "body_53", "body_hands")
-"""Layouts that can be named: those of ``solver.neural.layout``."""
+"""Layouts that can be named: those of ``markerscope.solver.neural.layout``."""
 
 
 @dataclass(frozen=True)

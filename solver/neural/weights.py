@@ -10,10 +10,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from solver import __version__
-from solver.errors import InputError
-from solver.io.atomic import write_bytes_atomic
-from solver.plain import json_text
+from markerscope.solver import __version__
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.plain import json_text
+from markerscope.solver.io.atomic import write_bytes_atomic
 
 if TYPE_CHECKING:
     from torch import Tensor

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from solver.clean.clean import Cleaned, CleanSettings, clean, put_back
-from solver.clean.gaps import FillSettings
-from solver.clean.outliers import OutlierSettings
-from solver.clean.request import Filling, OutlierMethod
-from solver.clean.swaps import Proposal, apply_proposals
-from solver.errors import InputError
-from solver.markers import Markers
-from solver.progress import Progress
+from markerscope.solver.cleaning.clean import Cleaned, CleanSettings, clean, put_back
+from markerscope.solver.cleaning.gaps import FillSettings
+from markerscope.solver.cleaning.outliers import OutlierSettings
+from markerscope.solver.cleaning.request import Filling, OutlierMethod
+from markerscope.solver.cleaning.swaps import Proposal, apply_proposals
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.progress import Progress
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.errors import InputError
+from markerscope.solver.core.errors import InputError
 
 KEY_LENGTH = 32
 """Hexadecimal digits of a result's key: 128 bits, short enough for every file system."""

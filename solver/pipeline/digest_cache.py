@@ -4,7 +4,7 @@ A size and a time of change prove nothing: both stay as they were when a file is
 times. So a small file is read each time. A larger one is remembered by its place on the disk (device and inode), size,
 time of change, and the time that the system itself notes of every change (ctime), which no program can set; and some
 of its content is compared each time, for disks that keep no such time (FAT, some network drives). Before and after a
-stage reads it, it is read whole in any case (``solver.pipeline.source``).
+stage reads it, it is read whole in any case (``markerscope.solver.pipeline.source``).
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from solver.io.atomic import write_text_atomic
-from solver.pipeline.digest import file_digest
+from markerscope.solver.io.atomic import write_text_atomic
+from markerscope.solver.pipeline.digest import file_digest
 
 SMALL_BYTES = 16 << 20
 """Read whole each time, which takes about ten milliseconds."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from solver.pipeline.cleaning import notes_of
-from solver.pipeline.stage import GraphRun
-from solver.solve.doubts.doubt import named, plural
-from solver.solve.doubts.far import SUSPECT_M
+from markerscope.solver.fit.doubts.doubt import named, plural
+from markerscope.solver.fit.doubts.far import SUSPECT_M
+from markerscope.solver.pipeline.cleaning import notes_of
+from markerscope.solver.pipeline.stage import GraphRun
 
 
 def assumptions(graph: GraphRun) -> tuple[str, ...]:

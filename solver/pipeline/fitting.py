@@ -8,33 +8,34 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.angles import AngleSettings, JointAngles
-from solver.neutral import Neutral, NeutralSettings
-from solver.pipeline.cleaning import measured
-from solver.pipeline.stage import NoSettings
-from solver.progress import Progress
-from solver.segment import Segmentation, SegmentSettings
-from solver.solve.doubts.rules import Verdict
-from solver.solve.results import CameraResult, FittedMotion, Localization, Orientation
-from solver.solve.settings import FitSettings, LocalizeSettings, OrientSettings
-from solver.surface import SurfaceDistance
+from markerscope.solver.angles.angles import AngleSettings, JointAngles
+from markerscope.solver.clustering.segment import Segmentation, SegmentSettings
+from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.core.progress import Progress
+from markerscope.solver.fit.doubts.rules import Verdict
+from markerscope.solver.fit.neutral import Neutral, NeutralSettings
+from markerscope.solver.fit.results import FittedMotion, Localization, Orientation
+from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
+from markerscope.solver.fit.surface import SurfaceDistance
+from markerscope.solver.pipeline.cleaning import measured
+from markerscope.solver.pipeline.stage import NoSettings
 
 if TYPE_CHECKING:
-    from solver.body.model import Body
-    from solver.solve.kinematics import Points
-    from solver.solve.state import Observations
+    from markerscope.solver.body.model import Body
+    from markerscope.solver.fit.kinematics import Points
+    from markerscope.solver.fit.state import Observations
 
 
 def group_markers(given: Mapping[str, Any], settings: SegmentSettings, progress: Progress) -> Segmentation:
     """Markers that move together."""
-    from solver.segment import segment
+    from markerscope.solver.clustering.segment import segment
 
     return segment(given["clean"].markers, settings, progress)
 
 
 def scene(given: Mapping[str, Any]) -> tuple[Body, Observations, Points]:
     """The body with free bone lengths, what was observed on the markers' clock, and the landmarks' body points."""
-    from solver.solve.observe import observe
+    from markerscope.solver.fit.observe import observe
 
     body, sync, markers = _body(given), given["sync"], measured(given["clean"])
     seen, points = observe(markers, given["prior"], given["landmarks"], body, sync.offset, sync.rate_ratio)
@@ -43,14 +44,14 @@ def scene(given: Mapping[str, Any]) -> tuple[Body, Observations, Points]:
 
 def _camera(path: Path | None, image_size: tuple[int, int]) -> CameraResult | None:
     """The camera of another trial, as it sees this video."""
-    from solver.io.camera import read_camera, resized
+    from markerscope.solver.io.camera import read_camera, resized
 
     return None if path is None else resized(read_camera(path), image_size, path)
 
 
 def place_markers(given: Mapping[str, Any], settings: LocalizeSettings, progress: Progress) -> Localization:
     """Hypotheses of where on the body the markers sit."""
-    from solver.solve.method import localize
+    from markerscope.solver.fit.method import localize
 
     body, seen, _ = scene(given)
     left_out = given["segment"].clusters < 0
@@ -60,7 +61,7 @@ def place_markers(given: Mapping[str, Any], settings: LocalizeSettings, progress
 
 def rank_placements(given: Mapping[str, Any], settings: OrientSettings, progress: Progress) -> Orientation:
     """The hypotheses fitted and ranked."""
-    from solver.solve.method import orient
+    from markerscope.solver.fit.method import orient
 
     body, seen, points = scene(given)
     camera = _camera(given["camera_file"], seen.image_size)
@@ -69,7 +70,7 @@ def rank_placements(given: Mapping[str, Any], settings: OrientSettings, progress
 
 def fit_every_frame(given: Mapping[str, Any], settings: FitSettings, progress: Progress) -> FittedMotion:
     """The chosen answer carried to every frame."""
-    from solver.solve.method import fit
+    from markerscope.solver.fit.method import fit
 
     body, seen, points = scene(given)
     time = given["clean"].markers.time
@@ -78,16 +79,16 @@ def fit_every_frame(given: Mapping[str, Any], settings: FitSettings, progress: P
 
 def _body(given: Mapping[str, Any]) -> Body:
     """The body with free bone lengths."""
-    from solver.body.bones import with_bone_lengths
-    from solver.body.model import Body
+    from markerscope.solver.body.bones import with_bone_lengths
+    from markerscope.solver.body.model import Body
 
     return with_bone_lengths(Body.load(given["body_file"]))
 
 
 def find_neutral(given: Mapping[str, Any], settings: NeutralSettings, progress: Progress) -> Neutral:
     """The pose that angles are counted from, if the user named one."""
-    from solver.io import load_markers
-    from solver.neutral import neutral_file, neutral_span
+    from markerscope.solver.fit.neutral import neutral_file, neutral_span
+    from markerscope.solver.io import load_markers
 
     path, motion = given["neutral_file"], given["fit"]
     if path is not None:
@@ -100,8 +101,8 @@ def find_neutral(given: Mapping[str, Any], settings: NeutralSettings, progress: 
 
 def read_angles(given: Mapping[str, Any], settings: AngleSettings, progress: Progress) -> JointAngles:
     """Joint angles of the fitted body, relative to the neutral pose where there is one."""
-    from solver.angles import joint_angles, relative_to
-    from solver.neutral import facing
+    from markerscope.solver.angles.angles import joint_angles, relative_to
+    from markerscope.solver.fit.neutral import facing
 
     body, motion, neutral = _body(given), given["fit"], given["neutral"]
     shaped = body.landmarks(motion.betas), body.joints(motion.betas)
@@ -114,17 +115,17 @@ def read_angles(given: Mapping[str, Any], settings: AngleSettings, progress: Pro
 
 def measure_surface(given: Mapping[str, Any], settings: NoSettings, progress: Progress) -> SurfaceDistance:
     """How far the markers are from the fitted skin."""
-    from solver.surface import surface_distance
+    from markerscope.solver.fit.surface import surface_distance
 
     return surface_distance(_body(given), given["fit"], measured(given["clean"]).positions, progress)
 
 
 def check_result(given: Mapping[str, Any], settings: NoSettings, progress: Progress) -> Verdict:
     """What speaks against the result, by every rule there is."""
-    from solver.solve.doubts.doubt import Evidence
-    from solver.solve.doubts.rules import verdict
-    from solver.solve.observe import on_clock
-    from solver.sync import lead
+    from markerscope.solver.fit.doubts.doubt import Evidence
+    from markerscope.solver.fit.doubts.rules import verdict
+    from markerscope.solver.fit.observe import on_clock
+    from markerscope.solver.sync.offset import lead
 
     motion, surface, sync, found = given["fit"], given["surface"], given["sync"], given["localize"]
     ranked: Orientation = given["orient"]

@@ -8,13 +8,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.markers import Markers
-from solver.pipeline.cleaning import measured
-from solver.prior import PosePrior
-from solver.progress import Progress
-from solver.sync import Sync
-from solver.video.landmarks import Landmarks
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.landmarks import Landmarks
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.core.progress import Progress
+from markerscope.solver.pipeline.cleaning import measured
+from markerscope.solver.sync.offset import Sync
 
 _MOSTLY = 0.9
 """A video that shows the person for less of the markers' time than this share is worth a word."""
@@ -106,8 +106,8 @@ def _positive(**values: float | None) -> None:
 
 def read_markers(given: Mapping[str, Any], settings: MarkerSettings, progress: Progress) -> Markers:
     """The marker file, or its range, if a solve can do something with it."""
-    from solver.io import load_markers
-    from solver.markers_check import require_solvable
+    from markerscope.solver.core.markers_check import require_solvable
+    from markerscope.solver.io import load_markers
 
     markers = load_markers(
         given["marker_file"], up=settings.up, units=settings.units, subject=settings.subject, rate=settings.rate
@@ -121,8 +121,8 @@ def watch_video(given: Mapping[str, Any], settings: LandmarkSettings, progress: 
     """The person's landmarks, left and right put in order; None without a video."""
     if given["video_file"] is None:
         return None
-    from solver.video.blazepose import track_pose
-    from solver.video.flips import mend_flips
+    from markerscope.solver.video.blazepose import track_pose
+    from markerscope.solver.video.flips import mend_flips
 
     landmarks = track_pose(given["video_file"], rate=settings.rate, progress=progress)
     return mend_flips(landmarks)[0] if settings.mend_flips else landmarks
@@ -132,15 +132,15 @@ def pose_prior(given: Mapping[str, Any], settings: PriorSettings, progress: Prog
     """Body poses: another program's, where the user has them, else lifted from the landmarks."""
     landmarks: Landmarks | None = given["landmarks"]
     if given["prior_file"] is None:
-        from solver.body.model import Body
-        from solver.video.lift import lift
+        from markerscope.solver.body.model import Body
+        from markerscope.solver.fit.lift import lift
 
         if landmarks is None:
             raise InputError("there is neither a video nor a pose prior", remedy="give one of them")
 
         # The embedded body's landmarks are the ones the network was matched to; rotations serve any body.
         return lift(landmarks, Body.load(), progress)
-    from solver.io.priors import load_prior
+    from markerscope.solver.io.priors import load_prior
 
     video_rate = None if landmarks is None else _video_rate(landmarks)
     prior = load_prior(given["prior_file"], fps=settings.rate or video_rate)
@@ -194,12 +194,12 @@ def _given_offset(settings: SyncSettings) -> Sync | None:
 
 
 def _found_offset(given: Mapping[str, Any], settings: SyncSettings) -> Sync:
-    from solver.sync import find_offset
+    from markerscope.solver.sync.offset import find_offset
 
     watched = given["landmarks"]
     if watched is None:
-        from solver.body.model import Body
-        from solver.video.shadow import landmarks_of_prior
+        from markerscope.solver.body.model import Body
+        from markerscope.solver.fit.shadow import landmarks_of_prior
 
         watched = landmarks_of_prior(given["prior"], Body.load())
     window = None if settings.search_s is None else (-settings.search_s, settings.search_s)

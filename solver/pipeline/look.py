@@ -21,25 +21,25 @@ def look_at(files: Mapping[str, Path | None]) -> None:
 
 
 def _camera(path: Path) -> Any:
-    from solver.io.camera import read_camera
+    from markerscope.solver.io.camera import read_camera
 
     return read_camera(path)
 
 
 def _body(path: Path) -> Any:
-    from solver.body.model import Body
+    from markerscope.solver.body.model import Body
 
     return Body.load(path)
 
 
 def _prior(path: Path) -> Any:
-    from solver.io.priors import load_prior
+    from markerscope.solver.io.priors import load_prior
 
     return load_prior(path)
 
 
 def _weights(path: Path) -> Any:
-    from solver.neural.weights import read_card
+    from markerscope.solver.neural.weights import read_card
 
     return read_card(path)
 

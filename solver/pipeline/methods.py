@@ -8,12 +8,12 @@ from functools import cache, reduce
 from operator import or_
 from typing import Any
 
-from solver.pipeline.request import Method
-from solver.pipeline.session import Session
-from solver.pipeline.stage import Stage
-from solver.pipeline.stages import GRAPH
-from solver.pipeline.stages_neural import GRAPH_NEURAL
-from solver.pipeline.stages_paper import GRAPH_PAPER
+from markerscope.solver.core.request import Method
+from markerscope.solver.pipeline.session import Session
+from markerscope.solver.pipeline.stage import Stage
+from markerscope.solver.pipeline.stages import GRAPH
+from markerscope.solver.pipeline.stages_neural import GRAPH_NEURAL
+from markerscope.solver.pipeline.stages_paper import GRAPH_PAPER
 
 GRAPHS: dict[Method, tuple[Stage, ...]] = {"bundle": GRAPH, "paper": GRAPH_PAPER, "neural": GRAPH_NEURAL}
 

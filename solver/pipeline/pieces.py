@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from solver.errors import InputError
-from solver.pipeline.store import Absent, Store
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline.store import Absent, Store
 
 _SUFFIX = ".part"
 

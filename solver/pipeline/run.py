@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from solver.pipeline.methods import graph_of
-from solver.pipeline.session import Session
-from solver.pipeline.stage import GraphRun, OnEvent, ignore, run_graph, stage_keys
-from solver.pipeline.stages import SOURCES
-from solver.progress import Progress, silent
+from markerscope.solver.core.progress import Progress, silent
+from markerscope.solver.pipeline.methods import graph_of
+from markerscope.solver.pipeline.session import Session
+from markerscope.solver.pipeline.stage import GraphRun, OnEvent, ignore, run_graph, stage_keys
+from markerscope.solver.pipeline.stages import SOURCES
 
 
 def keys_of(session: Session) -> dict[str, str]:

@@ -12,18 +12,18 @@ from urllib.parse import quote, unquote_to_bytes
 
 import tomli_w
 
-from solver import __version__
-from solver.errors import InputError
-from solver.io.atomic import make_folder, write_text_atomic
-from solver.pipeline.digest_cache import DigestCache
-from solver.pipeline.request import Method
-from solver.pipeline.session_file import FILE_NAME as FILE_NAME
-from solver.pipeline.session_file import sealed
-from solver.pipeline.settings import from_table, overlay, to_table
-from solver.pipeline.source import Source
-from solver.pipeline.stage import Stage
-from solver.pipeline.store import Store
-from solver.plain import shown
+from markerscope.solver import __version__
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.plain import shown
+from markerscope.solver.core.request import Method
+from markerscope.solver.io.atomic import make_folder, write_text_atomic
+from markerscope.solver.pipeline.digest_cache import DigestCache
+from markerscope.solver.pipeline.session_file import FILE_NAME as FILE_NAME
+from markerscope.solver.pipeline.session_file import sealed
+from markerscope.solver.pipeline.settings import from_table, overlay, to_table
+from markerscope.solver.pipeline.source import Source
+from markerscope.solver.pipeline.stage import Stage
+from markerscope.solver.pipeline.store import Store
 
 SCHEMA = 1
 SUFFIX = ".markerscope"

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from solver.errors import InputError
-from solver.pipeline.digest import digest_of
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline.digest import digest_of
 
 FILE_NAME = "session.toml"
 _SEAL = "# As Markerscope wrote it, but for the edits: "

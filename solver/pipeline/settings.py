@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from solver.errors import InputError
+from markerscope.solver.core.errors import InputError
 
 UNSET = "unset"
 """TOML has no null: the names of the settings that are None stand in a list under this key."""

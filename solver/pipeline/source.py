@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from solver.errors import InputError
-from solver.io.filled_list import filled_list_path
-from solver.pipeline.digest import file_digest
-from solver.pipeline.digest_cache import DigestCache, stamp_of
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.filled_list import filled_list_path
+from markerscope.solver.pipeline.digest import file_digest
+from markerscope.solver.pipeline.digest_cache import DigestCache, stamp_of
 
 _GLANCE_EVERY_S = 0.2
 

@@ -11,12 +11,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
-from solver.errors import Cancelled, InputError
-from solver.pipeline.digest import canonical, file_digest, result_key
-from solver.pipeline.pieces import Pieces
-from solver.pipeline.source import Source, Touched, Watch, changed
-from solver.pipeline.store import Absent, Store
-from solver.progress import Found, Progress, part_of, silent, tell
+from markerscope.solver.core.errors import Cancelled, InputError
+from markerscope.solver.core.progress import Found, Progress, part_of, silent, tell
+from markerscope.solver.pipeline.digest import canonical, file_digest, result_key
+from markerscope.solver.pipeline.pieces import Pieces
+from markerscope.solver.pipeline.source import Source, Touched, Watch, changed
+from markerscope.solver.pipeline.store import Absent, Store
 
 State = Literal["cached", "stale", "not run", "running", "failed"]
 

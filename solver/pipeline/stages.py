@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.angles import AngleSettings, JointAngles
-from solver.body.model import EMBEDDED
-from solver.clean.clean import Cleaned
-from solver.markers import Markers
-from solver.neutral import Neutral, NeutralSettings
-from solver.pipeline import cleaning, fitting, inputs
-from solver.pipeline.cleaning import CleaningSettings
-from solver.pipeline.inputs import LandmarkSettings, MarkerSettings, PriorSettings, SyncSettings
-from solver.pipeline.stage import NoSettings, Stage
-from solver.prior import PosePrior
-from solver.segment import Segmentation, SegmentSettings
-from solver.solve.doubts.rules import Verdict
-from solver.solve.results import FittedMotion, Localization, Orientation
-from solver.solve.settings import FitSettings, LocalizeSettings, OrientSettings
-from solver.surface import SurfaceDistance
-from solver.sync import Sync
-from solver.video.landmarks import Landmarks
+from markerscope.solver.angles.angles import AngleSettings, JointAngles
+from markerscope.solver.body.model import EMBEDDED
+from markerscope.solver.cleaning.clean import Cleaned
+from markerscope.solver.clustering.segment import Segmentation, SegmentSettings
+from markerscope.solver.core.landmarks import Landmarks
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.fit.doubts.rules import Verdict
+from markerscope.solver.fit.neutral import Neutral, NeutralSettings
+from markerscope.solver.fit.results import FittedMotion, Localization, Orientation
+from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
+from markerscope.solver.fit.surface import SurfaceDistance
+from markerscope.solver.pipeline import cleaning, fitting, inputs
+from markerscope.solver.pipeline.cleaning import CleaningSettings
+from markerscope.solver.pipeline.inputs import LandmarkSettings, MarkerSettings, PriorSettings, SyncSettings
+from markerscope.solver.pipeline.stage import NoSettings, Stage
+from markerscope.solver.sync.offset import Sync
 
 SOURCES = ("marker_file", "video_file", "prior_file", "camera_file", "body_file", "weights_file", "neutral_file")
 """The files a session is made from, by the names ``session.toml`` has for them."""

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.neural.agnostic_fit import NetworkPoses, NeuralFitSettings
-from solver.pipeline.fitting import scene as scene_of
-from solver.pipeline.stage import Stage
-from solver.pipeline.stages import BODY, FITTED_TO, GRAPH, said_fit
-from solver.progress import Progress, part_of
-from solver.solve.results import FittedMotion
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.progress import Progress, part_of
+from markerscope.solver.fit.results import FittedMotion
+from markerscope.solver.neural.layout_free.agnostic_fit import NetworkPoses, NeuralFitSettings
+from markerscope.solver.pipeline.fitting import scene as scene_of
+from markerscope.solver.pipeline.stage import Stage
+from markerscope.solver.pipeline.stages import BODY, FITTED_TO, GRAPH, said_fit
 
 SHIPPED_VERSION = 1
 """To be raised with the weights that ship: what other weights said is computed again."""
@@ -50,8 +50,8 @@ def ask_network(given: Mapping[str, Any], settings: NetworkSettings, progress: P
 
 def fit_from_poses(given: Mapping[str, Any], settings: NeuralFitSettings, progress: Progress) -> FittedMotion:
     """The network's poses refined on the markers in every frame."""
-    from solver.neural.agnostic_fit import fit_from_network
-    from solver.solve.method import chosen_row
+    from markerscope.solver.fit.method import chosen_row
+    from markerscope.solver.neural.layout_free.agnostic_fit import fit_from_network
 
     body, seen, points = scene_of(given)
     poses: NetworkPoses = given["network"]
@@ -64,12 +64,12 @@ def fit_from_poses(given: Mapping[str, Any], settings: NeuralFitSettings, progre
 
 def _poses(given: Mapping[str, Any], settings: NetworkSettings, row: int, progress: Progress) -> NetworkPoses:
     """The network's poses with the markers where a candidate has them, beside the default fit of that candidate."""
-    from solver.neural.agnostic_fit import marked
-    from solver.neural.agnostic_trust import blended
-    from solver.neural.posing import pose_network
-    from solver.solve.kinematics import Points, Pose, forward, place_points
-    from solver.solve.method import fit, in_use
-    from solver.solve.settings import FitSettings
+    from markerscope.solver.fit.kinematics import Points, Pose, forward, place_points
+    from markerscope.solver.fit.method import fit, in_use
+    from markerscope.solver.fit.settings import FitSettings
+    from markerscope.solver.neural.layout_free.agnostic_fit import marked
+    from markerscope.solver.neural.layout_free.agnostic_trust import blended
+    from markerscope.solver.neural.posing import pose_network
 
     body, seen, landmarks = scene_of(given)
     found, ranked, cleaned = given["localize"], given["orient"], given["clean"].markers

@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from solver.pipeline.fitting import group_markers
-from solver.pipeline.fitting import scene as scene_of
-from solver.pipeline.stage import NoSettings, Stage
-from solver.pipeline.stages import BODY, FITTED_TO, GRAPH, said_fit, said_orientation, said_segmentation
-from solver.progress import Progress
-from solver.segment import Segmentation, SegmentSettings
-from solver.solve.paper.results import PaperLocalization, PaperSolve
-from solver.solve.paper.settings import PaperFitSettings, PaperLocalizeSettings, PaperSolveSettings
-from solver.solve.results import FittedMotion, Orientation
+from markerscope.solver.clustering.segment import Segmentation, SegmentSettings
+from markerscope.solver.core.progress import Progress
+from markerscope.solver.fit.published.results import PaperLocalization, PaperSolve
+from markerscope.solver.fit.published.settings import PaperFitSettings, PaperLocalizeSettings, PaperSolveSettings
+from markerscope.solver.fit.results import FittedMotion, Orientation
+from markerscope.solver.pipeline.fitting import group_markers
+from markerscope.solver.pipeline.fitting import scene as scene_of
+from markerscope.solver.pipeline.stage import NoSettings, Stage
+from markerscope.solver.pipeline.stages import BODY, FITTED_TO, GRAPH, said_fit, said_orientation, said_segmentation
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class PaperSegmentSettings(SegmentSettings):
 
 def find_part(given: Mapping[str, Any], settings: PaperLocalizeSettings, progress: Progress) -> PaperLocalization:
     """The part of the body that carries the markers."""
-    from solver.solve.paper.localize import localize_paper
+    from markerscope.solver.fit.published.localize import localize_paper
 
     body, seen, _ = scene_of(given)
     return localize_paper(
@@ -37,7 +37,7 @@ def find_part(given: Mapping[str, Any], settings: PaperLocalizeSettings, progres
 
 def solve_stages(given: Mapping[str, Any], settings: PaperSolveSettings, progress: Progress) -> PaperSolve:
     """The paper's five stages."""
-    from solver.solve.paper.solve import solve_paper
+    from markerscope.solver.fit.published.solve import solve_paper
 
     body, seen, _ = scene_of(given)
     return solve_paper(body, seen, given["localize"], settings, given["prior"].betas, progress)
@@ -45,7 +45,7 @@ def solve_stages(given: Mapping[str, Any], settings: PaperSolveSettings, progres
 
 def rank_yaws(given: Mapping[str, Any], settings: NoSettings, progress: Progress) -> Orientation:
     """Its yaws and chains as candidates."""
-    from solver.solve.paper.ranking import orientation_of
+    from markerscope.solver.fit.published.ranking import orientation_of
 
     body, seen, points = scene_of(given)
     return orientation_of(body, seen, points, given["localize"], given["solve"])
@@ -53,7 +53,7 @@ def rank_yaws(given: Mapping[str, Any], settings: NoSettings, progress: Progress
 
 def every_frame(given: Mapping[str, Any], settings: PaperFitSettings, progress: Progress) -> FittedMotion:
     """Its answer at every frame of the markers."""
-    from solver.solve.paper.motion import motion_of
+    from markerscope.solver.fit.published.motion import motion_of
 
     body, seen, _ = scene_of(given)
     found, solved, ranked = given["localize"], given["solve"], given["orient"]

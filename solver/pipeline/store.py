@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from solver.io.atomic import cannot_write
-from solver.pipeline.codec import decode, encode
+from markerscope.solver.io.atomic import cannot_write
+from markerscope.solver.pipeline.codec import decode, encode
 
 SCHEMA = 1
 _TEMPORARY = ".tmp-"

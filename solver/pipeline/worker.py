@@ -20,10 +20,10 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
-from solver.errors import Cancelled, MarkerscopeError
-from solver.pipeline.stage import Event
-from solver.pipeline.store import Store
-from solver.progress import Found
+from markerscope.solver.core.errors import Cancelled, MarkerscopeError
+from markerscope.solver.core.progress import Found
+from markerscope.solver.pipeline.stage import Event
+from markerscope.solver.pipeline.store import Store
 
 _REPORT_EVERY_S = 0.05
 _NICE = 5

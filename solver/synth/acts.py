@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.body.model import Body
-from solver.errors import InputError
-from solver.synth.choreography import Key, mirrored, perform
-from solver.synth.demo_motion import demo_motion
-from solver.synth.motion import Motion
-from solver.synth.walking import walk
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.synth.choreography import Key, mirrored, perform
+from markerscope.solver.synth.demo_motion import demo_motion
+from markerscope.solver.synth.motion import Motion
+from markerscope.solver.synth.walking import walk
 
 
 def _both(pose: dict[str, float]) -> dict[str, float]:

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.body.bones import MODES, with_bone_lengths
-from solver.body.model import Body, vertex_normals
-from solver.body.skeleton import INDEX, JOINTS, PARENTS, mirror_index
+from markerscope.solver.body.bones import MODES, with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.meshes import vertex_normals
+from markerscope.solver.core.skeleton import INDEX, JOINTS, PARENTS, mirror_index
 
 
 def vary_body(body: Body, rng: np.random.Generator, *, bones: float = 0.03, bumps: float = 0.010) -> Body:

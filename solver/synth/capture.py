@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.body.model import Body, chain
-from solver.body.skeleton import JOINTS
-from solver.markers import Markers
-from solver.synth.motion import Motion
-from solver.synth.placement import Placement
+from markerscope.solver.body.model import Body, chain
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.skeleton import JOINTS
+from markerscope.solver.synth.motion import Motion
+from markerscope.solver.synth.placement import Placement
 
 _SLIDE = {
     "pelvis": 4.0,

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS
-from solver.synth.motion import Motion
-from solver.synth.rig import LAB_FROM_REST, Foot, Sway, set_leg, standing_height, turn
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.skeleton import INDEX, JOINTS
+from markerscope.solver.synth.motion import Motion
+from markerscope.solver.synth.rig import LAB_FROM_REST, Foot, Sway, set_leg, standing_height, turn
 
 _X, _Y, _Z = np.eye(3)
 _MIRRORED = ("left", "list", "turn", "side", "twist", "look")  # change their sign where left and right are exchanged

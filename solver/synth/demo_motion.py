@@ -8,10 +8,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS
-from solver.synth.motion import Motion
-from solver.synth.rig import LAB_FROM_REST, Foot, Steps, Sway, ease, hump, set_leg, standing_height, stepping_foot, turn
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.skeleton import INDEX, JOINTS
+from markerscope.solver.synth.motion import Motion
+from markerscope.solver.synth.rig import (
+    LAB_FROM_REST,
+    Foot,
+    Steps,
+    Sway,
+    ease,
+    hump,
+    set_leg,
+    standing_height,
+    stepping_foot,
+    turn,
+)
 
 _FIRST_STEP, _STEP, _SWING = 0.5, 0.56, 0.40  # s: when walking starts, step duration, time a foot is in the air
 _STOP = 6.0  # s, no step begins later

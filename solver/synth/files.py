@@ -11,21 +11,21 @@ from typing import Any
 
 import numpy as np
 
-from solver import __version__
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.errors import InputError
-from solver.io.atomic import write_text_atomic
-from solver.io.export_c3d import write_c3d
-from solver.io.export_smpl import write_smpl_npz
-from solver.io.markers_in import load_markers
-from solver.io.together import together
-from solver.plain import json_text
-from solver.prior import PosePrior
-from solver.rotations import exp_so3, log_so3
-from solver.synth.session import SynthSession
-from solver.synth.settings import SynthSettings
-from solver.synth.truth import TRUTH, Truth, load_truth, save_truth
+from markerscope.solver import __version__
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.plain import json_text
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.core.rotations import exp_so3, log_so3
+from markerscope.solver.io.atomic import write_text_atomic
+from markerscope.solver.io.export_c3d import write_c3d
+from markerscope.solver.io.export_smpl import write_smpl_npz
+from markerscope.solver.io.markers_in import load_markers
+from markerscope.solver.io.together import together
+from markerscope.solver.synth.session import SynthSession
+from markerscope.solver.synth.settings import SynthSettings
+from markerscope.solver.synth.truth import TRUTH, Truth, load_truth, save_truth
 
 MARKERS, PRIOR, REFERENCE, ABOUT = "markers.c3d", "prior.npz", "reference.npz", "synth.json"
 FILES = (MARKERS, PRIOR, TRUTH, REFERENCE, ABOUT)

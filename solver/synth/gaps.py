@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.clean.gap_statistics import GapStatistics, heavy_tail
+from markerscope.solver.cleaning.gap_statistics import GapStatistics, heavy_tail
 
 HIDDEN_FRAMES = 10
 """How long a marker stays hidden in the paper's trial (Milef et al. 2024, appendix E.3)."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, PARTS
-from solver.synth.sites import Sites, sites_at
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.skeleton import INDEX, PARTS
+from markerscope.solver.synth.sites import Sites, sites_at
 
 _REACH = 0.25  # m, how far from a bone its skin is looked for
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.body.model import Body, chain
-from solver.body.skeleton import INDEX
-from solver.rotations import exp_so3, kabsch, log_so3, slerp
+from markerscope.solver.body.model import Body, chain
+from markerscope.solver.core.rotations import exp_so3, kabsch, log_so3, slerp
+from markerscope.solver.core.skeleton import INDEX
 
 _TURN = 0.25  # s, from full speed to rest where the playing turns
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.body.model import Body
-from solver.body.skeleton import INDEX
-from solver.synth.motion import Motion
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.synth.motion import Motion
 
 MARKERS_PER_BONE: dict[str, int] = {
     **{"pelvis": 4, "spine3": 5, "head": 3},

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.body.skeleton import JOINTS, mirror_index
-from solver.prior import PosePrior
-from solver.prior_fill import fill_lost
-from solver.rotations import exp_so3
-from solver.synth.motion import Motion
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.core.prior_fill import fill_lost
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import JOINTS, mirror_index
+from markerscope.solver.synth.motion import Motion
 
 _LOST_SPAN, _FLIP_SPAN = (0.3, 2.0), (0.2, 1.0)  # s, shortest and longest
 

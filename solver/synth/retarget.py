@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.body.model import Body, chain
-from solver.body.skeleton import INDEX, JOINTS
-from solver.errors import InputError
-from solver.io.motion import SkeletonMotion
-from solver.rotations import exp_so3, kabsch, log_so3
-from solver.synth.motion import Motion, at_rate
+from markerscope.solver.body.model import Body, chain
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.rotations import exp_so3, kabsch, log_so3
+from markerscope.solver.core.skeleton import INDEX, JOINTS
+from markerscope.solver.io.motion import SkeletonMotion
+from markerscope.solver.synth.motion import Motion, at_rate
 
 _ALIASES = {
     "hip": ("lfemur", "leftupleg", "leftupperleg", "upperlegl", "leftthigh", "thighl", "lthigh", "lefthip", "lhip"),

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.body.skeleton import INDEX
-from solver.rotations import exp_so3
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX
 
 LAB_FROM_REST = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 """(3, 3) stands the rest body (y up, facing +z) up in the lab (z up), facing +x."""

@@ -7,25 +7,25 @@ from typing import Any
 
 import numpy as np
 
-from solver.body.model import Body, chain
-from solver.clean.gap_statistics import load_gap_statistics
-from solver.io.motion import SkeletonMotion
-from solver.markers import Markers
-from solver.prior import PosePrior
-from solver.synth.acts import act
-from solver.synth.body import vary_body, vary_bones
-from solver.synth.capture import sliding
-from solver.synth.gaps import gaps_like, heavy_tailed_gaps, hidden_by_chance
-from solver.synth.ghosts import ghosts
-from solver.synth.layouts import named_sites
-from solver.synth.motion import Motion, carried_over, damped, on_floor, played
-from solver.synth.prior import PriorError, corrupt_prior, other_shape
-from solver.synth.retarget import retarget
-from solver.synth.settings import SynthSettings
-from solver.synth.sites import Sites, site_paths, uniform_sites
-from solver.synth.streams import stream
-from solver.synth.swaps import draw_swaps, holders
-from solver.synth.truth import Truth
+from markerscope.solver.body.model import Body, chain
+from markerscope.solver.cleaning.gap_statistics import load_gap_statistics
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.io.motion import SkeletonMotion
+from markerscope.solver.synth.acts import act
+from markerscope.solver.synth.body import vary_body, vary_bones
+from markerscope.solver.synth.capture import sliding
+from markerscope.solver.synth.gaps import gaps_like, heavy_tailed_gaps, hidden_by_chance
+from markerscope.solver.synth.ghosts import ghosts
+from markerscope.solver.synth.layouts import named_sites
+from markerscope.solver.synth.motion import Motion, carried_over, damped, on_floor, played
+from markerscope.solver.synth.prior import PriorError, corrupt_prior, other_shape
+from markerscope.solver.synth.retarget import retarget
+from markerscope.solver.synth.settings import SynthSettings
+from markerscope.solver.synth.sites import Sites, site_paths, uniform_sites
+from markerscope.solver.synth.streams import stream
+from markerscope.solver.synth.swaps import draw_swaps, holders
+from markerscope.solver.synth.truth import Truth
 
 __all__ = ["SynthSession", "SynthSettings", "synthesise"]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal, get_args
 
-from solver.body.skeleton import PARTS
-from solver.errors import InputError
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.skeleton import PARTS
 
 Layout = Literal[
     "uniform",
@@ -48,7 +48,7 @@ class SynthSettings:
     lost : fraction of the samples that is missing, in gaps whose lengths have a heavy tail
     longest_gap : s, of these
     hidden_chance : chance for each marker in each frame to be hidden for the next 10 frames
-    gap_statistics : npz file of real gaps, see ``solver.clean.gap_statistics``
+    gap_statistics : npz file of real gaps, see ``markerscope.solver.cleaning.gap_statistics``
     gap_times : times the frequency of gaps in that file
     ghosts : columns that are no marker: reflections that stand, wander or flicker near the body
     swaps : how often two near markers exchange their columns

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, PARTS
-from solver.errors import InputError
-from solver.synth.motion import Motion
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.skeleton import INDEX, PARTS
+from markerscope.solver.synth.motion import Motion
 
 _PER_BONE = 2  # markers that each bone of a part gets at least
 _FRAMES_AT_ONCE = 2000  # keeps what is posed at a time small

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from solver.errors import InputError
-from solver.io.asf_amc import read_asf_amc
-from solver.io.bvh import read_bvh
-from solver.io.motion import SkeletonMotion
-from solver.synth.acts import ACTS
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.asf_amc import read_asf_amc
+from markerscope.solver.io.bvh import read_bvh
+from markerscope.solver.io.motion import SkeletonMotion
+from markerscope.solver.synth.acts import ACTS
 
 _AMC_RATE = 120.0  # Hz, which the format does not tell
 

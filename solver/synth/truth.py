@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from resources import resource
-from solver.body.model import Body
-from solver.errors import InputError
-from solver.io.atomic import write_bytes_atomic
-from solver.rotations import exp_so3, log_so3
-from solver.synth.motion import Motion
+from markerscope.resources import resource
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.rotations import exp_so3, log_so3
+from markerscope.solver.io.atomic import write_bytes_atomic
+from markerscope.solver.synth.motion import Motion
 
 TRUTH = "truth.npz"
 

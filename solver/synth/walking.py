@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.body.model import Body
-from solver.synth.choreography import Course, embodied
-from solver.synth.motion import Motion
-from solver.synth.rig import Steps, Sway, ease, stepping_foot
+from markerscope.solver.body.model import Body
+from markerscope.solver.synth.choreography import Course, embodied
+from markerscope.solver.synth.motion import Motion
+from markerscope.solver.synth.rig import Steps, Sway, ease, stepping_foot
 
 _FIRST, _STEP, _SWING = 0.5, 0.56, 0.40  # s, as in ``rig.Steps``
 _SPEED, _RADIUS = (0.7, 1.0), (1.6, 2.4)  # m/s, m

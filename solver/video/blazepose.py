@@ -7,14 +7,21 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.progress import Progress, pieces_of, silent
-from solver.video.ahead import ahead
-from solver.video.blazepose_models import DETECTOR_SIDE, LANDMARK_SIDE, Detection, Detector, LandmarkNetwork, Pose
-from solver.video.frames import announced, read_frames
-from solver.video.landmarks import LANDMARKS, Landmarks
-from solver.video.region import Region
-from solver.video.watched import Row, State, Watched
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.landmarks import LANDMARKS, Landmarks
+from markerscope.solver.core.progress import Progress, pieces_of, silent
+from markerscope.solver.video.ahead import ahead
+from markerscope.solver.video.blazepose_models import (
+    DETECTOR_SIDE,
+    LANDMARK_SIDE,
+    Detection,
+    Detector,
+    LandmarkNetwork,
+    Pose,
+)
+from markerscope.solver.video.frames import announced, read_frames
+from markerscope.solver.video.region import Region
+from markerscope.solver.video.watched import Row, State, Watched
 
 _MIN_PRESENCE = 0.5
 _CALM = 0.1  # how much of a tiny move the crop follows from frame to frame
@@ -76,7 +83,8 @@ class Tracker:
 def track_pose(path: str | Path, *, rate: float = 30.0, progress: Progress = silent, threads: int = 2) -> Landmarks:
     """Landmarks of the largest, most central person of a video, as the network gives them, unsmoothed.
 
-    Where the listener of the progress keeps pieces (``solver.progress.pieces_of``), it goes on from those there are.
+    Where the listener of the progress keeps pieces (``markerscope.solver.core.progress.pieces_of``), it goes on from
+    those there are.
 
     Parameters
     ----------

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from resources import resource
-from solver.errors import InputError
+from markerscope.resources import resource
+from markerscope.solver.core.errors import InputError
 
 DETECTOR_SIDE = 224
 LANDMARK_SIDE = 256

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.video.landmarks import LANDMARKS, Landmarks
+from markerscope.solver.core.landmarks import LANDMARKS, Landmarks
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "trunk": ("eye_inner", "eye", "eye_outer", "ear", "shoulder", "hip"),

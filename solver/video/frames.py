@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.video.upright import IDENTITY, Upright
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.video.upright import IDENTITY, Upright
 
 if TYPE_CHECKING:
     from av import VideoFrame

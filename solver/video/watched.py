@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.progress import Pieces
-from solver.video.landmarks import Landmarks
-from solver.video.region import Region
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.landmarks import Landmarks
+from markerscope.solver.core.progress import Pieces
+from markerscope.solver.video.region import Region
 
 PIECE = 32
 """Rows of a piece: about a second of work, which is all that is lost where the program is killed."""

@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
-from app.cli_commands import DEMO_MARKERS, DEMO_VIDEO
-from app.models.results import Results, StageResults
-from solver.pipeline.methods import graph_of, with_method
-from solver.pipeline.request import Method
-from solver.pipeline.run import keys_of, run_session
-from solver.pipeline.session import InputFile, Session, load_session, save_session
+from markerscope.app.models.demo import DEMO_MARKERS, DEMO_VIDEO
+from markerscope.app.models.results import Results, StageResults
+from markerscope.solver.core.request import Method
+from markerscope.solver.pipeline.methods import graph_of, with_method
+from markerscope.solver.pipeline.run import keys_of, run_session
+from markerscope.solver.pipeline.session import InputFile, Session, load_session, save_session
 
 RANGE = 2.0, 3.0
 """s of the embedded session."""

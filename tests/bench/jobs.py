@@ -6,7 +6,7 @@ import os
 import time
 from typing import Any
 
-from solver.bench.execute import Run
+from markerscope.solver.bench.execute import Run
 
 
 def figures(**changed: Any) -> dict[str, Any]:

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli import main
 from benchmarks.insert import put
-from solver.bench.clean import _outliers, resampled, run_clean_bench
-from solver.errors import InputError
-from solver.io.export_c3d import write_c3d
-from solver.markers import Markers
+from markerscope.app.cli.main import main
+from markerscope.solver.bench.clean import _outliers, resampled, run_clean_bench
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.io.export_c3d import write_c3d
 
 
 def recording(path: Path) -> Path:

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.cli import main
 from benchmarks.insert import PAGES, put
-from solver.bench import motions
-from solver.bench.cases import SUITES, cases_of
-from solver.bench.motions import find_motions, read_source
-from solver.bench.registry import VARIANTS, with_ablations
-from solver.bench.request import BenchRequest
-from solver.bench.table import BINS
-from solver.errors import InputError
-from solver.io.motion import SkeletonMotion
+from markerscope.app.cli.main import main
+from markerscope.solver.bench import motions
+from markerscope.solver.bench.cases import SUITES, cases_of
+from markerscope.solver.bench.motions import find_motions, read_source
+from markerscope.solver.bench.registry import VARIANTS, with_ablations
+from markerscope.solver.bench.request import BenchRequest
+from markerscope.solver.bench.table import BINS
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.motion import SkeletonMotion
 
 WORDS = ["bench", "short", "--frames", "60", "--motion-count", "2", "--cases", "left-leg", "--workers", "2"]
 

@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.bench.execute import given_of
-from solver.bench.imported import imported, marker_key, write_for_others
-from solver.bench.measure import measure
-from solver.bench.methods import Given, Variant
-from solver.bench.registry import method_named
-from solver.errors import InputError
-from solver.io.export_smpl import write_smpl_npz
-from solver.io.markers_in import load_markers
-from solver.io.priors import load_prior
-from solver.rotations import log_so3
-from solver.synth.session import SynthSession, SynthSettings, synthesise
+from markerscope.solver.bench.execute import given_of
+from markerscope.solver.bench.imported import imported, marker_key, write_for_others
+from markerscope.solver.bench.measure import measure
+from markerscope.solver.bench.methods import Given, Variant
+from markerscope.solver.bench.registry import method_named
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.rotations import log_so3
+from markerscope.solver.io.export_smpl import write_smpl_npz
+from markerscope.solver.io.markers_in import load_markers
+from markerscope.solver.io.priors import load_prior
+from markerscope.solver.synth.session import SynthSession, SynthSettings, synthesise
 
 
 @pytest.fixture(scope="module")

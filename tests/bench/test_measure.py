@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.bench.measure import errors, heading_error_deg, measure, near_bones, right_part
-from solver.bench.methods import Alternative, Solved
-from solver.body.skeleton import INDEX, mirror_index
-from solver.rotations import exp_so3
-from solver.synth.session import SynthSession, SynthSettings, synthesise
+from markerscope.solver.bench.measure import errors, heading_error_deg, measure, near_bones, right_part
+from markerscope.solver.bench.methods import Alternative, Solved
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX, mirror_index
+from markerscope.solver.synth.session import SynthSession, SynthSettings, synthesise
 
 LEG = [INDEX[f"left_{name}"] for name in ("hip", "knee", "ankle", "foot")]
 

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.bench import neural, neural_rows
-from solver.bench.neural import held_out, neural_suite
-from solver.bench.neural_exam import examined, new_layout, recordings
-from solver.bench.request import BenchRequest
-from solver.body.model import Body
-from solver.errors import InputError
-from solver.neural.library import Clip, procedural_clips
-from solver.progress import silent
+from markerscope.solver.bench import neural, neural_rows
+from markerscope.solver.bench.neural import held_out, neural_suite
+from markerscope.solver.bench.neural_exam import examined, new_layout, recordings
+from markerscope.solver.bench.request import BenchRequest
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.progress import silent
+from markerscope.solver.neural.training.library import Clip, procedural_clips
 
 pytest.importorskip("torch", reason="networks need torch")
 

@@ -14,16 +14,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.bench import execute as execution
-from solver.bench.cases import cases_of
-from solver.bench.execute import OutOfTime, Run, execute, time_limit
-from solver.bench.keys import key_of
-from solver.bench.methods import Variant
-from solver.bench.motions import find_motions
-from solver.bench.runner import record_of, record_path, run_all
-from solver.errors import InputError
-from solver.io.export_bvh import write_bvh
-from solver.pipeline.source import Changed
+from markerscope.solver.bench import execute as execution
+from markerscope.solver.bench.cases import cases_of
+from markerscope.solver.bench.execute import OutOfTime, Run, execute, time_limit
+from markerscope.solver.bench.keys import key_of
+from markerscope.solver.bench.methods import Variant
+from markerscope.solver.bench.motions import find_motions
+from markerscope.solver.bench.runner import record_of, record_path, run_all
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.export_bvh import write_bvh
+from markerscope.solver.pipeline.source import Changed
 from tests.bench import jobs
 
 ROOT = Path(__file__).parents[2]
@@ -98,7 +98,7 @@ def test_control_c_leaves_whole_records_and_nobody_at_work(tmp_path: Path) -> No
     code = (
         "import signal, sys\n"
         "from pathlib import Path\n"
-        "from solver.bench.runner import run_all\n"
+        "from markerscope.solver.bench.runner import run_all\n"
         "from tests.bench import jobs\n"
         "from tests.bench.test_runner import some\n"
         "if __name__ == '__main__':\n"
@@ -107,7 +107,7 @@ def test_control_c_leaves_whole_records_and_nobody_at_work(tmp_path: Path) -> No
     )
     script = tmp_path / "script.py"
     script.write_text(code)
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
+    environment = {**os.environ, "PYTHONPATH": os.environ["PYTHONPATH"], "PYTHONUNBUFFERED": "1"}
     with subprocess.Popen([sys.executable, script], cwd=ROOT, env=environment, stdout=-1, stderr=-1) as process:
         assert process.stdout is not None
         process.stdout.readline()  # the first run's progress

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.bench.descents import descents_of
-from solver.bench.table import bins_of, markdown_of, rows_of
+from markerscope.solver.bench.descents import descents_of
+from markerscope.solver.bench.table import bins_of, markdown_of, rows_of
 from tests.bench.jobs import figures
 
 

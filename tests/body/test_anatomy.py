@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.body.anatomy import MODEL_THORAX, SEGMENT_JOINT, UPRIGHT, segment_frames
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.body.skeleton import INDEX
+from markerscope.solver.body.anatomy import MODEL_THORAX, SEGMENT_JOINT, UPRIGHT, segment_frames
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.skeleton import INDEX
 
 ACROSS = np.diag([-1.0, 1, 1])
 ISB = {"pelvis": "spines", "thorax": "isb", "upper_arm": "epicondyles", "forearm": "ulna"}

@@ -8,12 +8,12 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from resources.bake_body import coarse, joint_centres, markers, proportions, rig, shape_space, tpose
-from resources.bake_body.picker import Picker, mean
-from resources.bake_body.source import Sample
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, PARENTS
-from solver.rotations import exp_so3
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX, PARENTS
+from tools.bake_body import coarse, joint_centres, markers, proportions, rig, shape_space, tpose
+from tools.bake_body.picker import Picker, mean
+from tools.bake_body.source import Sample
 
 
 def sphere(level: int = 4) -> tuple[np.ndarray, np.ndarray]:

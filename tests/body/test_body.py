@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.angles import AngleSettings, joint_angles
-from solver.body.adapt import load_smpl
-from solver.body.model import EMBEDDED, Body
-from solver.body.skeleton import PARENTS
-from solver.rotations import exp_so3
+from markerscope.solver.angles.angles import AngleSettings, joint_angles
+from markerscope.solver.body.adapt import load_smpl
+from markerscope.solver.body.model import EMBEDDED, Body
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import PARENTS
 
 
 @pytest.fixture(scope="module")

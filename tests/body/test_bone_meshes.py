@@ -6,13 +6,13 @@ import numpy as np
 import open3d
 import pytest
 
-from resources import resource
-from resources.bake_body import bones as bake
-from solver.body.bone_meshes import BoneMeshes, anchor_places, bone_meshes, carried
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS
-from solver.rotations import exp_so3
+from markerscope.resources import resource
+from markerscope.solver.body.bone_meshes import BoneMeshes, anchor_places, bone_meshes, carried
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX, JOINTS
+from tools.bake_body import bones as bake
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def test_points_are_carried_as_their_anchors_go():
 
 
 def test_thinning_keeps_every_bone():
-    from resources.bake_body.rajagopal import Mesh
+    from tools.bake_body.rajagopal import Mesh
 
     ball = open3d.geometry.TriangleMesh.create_sphere(0.05, 20)
     big = bake.Part(Mesh(np.asarray(ball.vertices), np.asarray(ball.triangles)), "thorax", 9, 9, 0.0)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.body.bones import MODES, BoneMode, with_bone_lengths
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS, descendants, mirror_index
+from markerscope.solver.body.bones import MODES, BoneMode, with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.skeleton import INDEX, JOINTS, descendants, mirror_index
 
 
 @pytest.fixture(scope="module")

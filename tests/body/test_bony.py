@@ -7,12 +7,12 @@ import open3d
 import pytest
 import trimesh
 
-from resources.bake_body import bony_skin
-from resources.bake_body.picker import Landmark, Picker
-from solver.body.bony import bony_sites
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS, mirror_index
-from solver.rotations import exp_so3
+from markerscope.solver.body.bony import bony_sites
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX, JOINTS, mirror_index
+from tools.bake_body import bony_skin
+from tools.bake_body.picker import Landmark, Picker
 
 NOTHING = np.zeros(10)
 BONES = {
@@ -65,7 +65,7 @@ def test_skin_over_bone_stays_with_it_when_a_joint_bends(body: Body, joint: str)
 
 
 def _below(bone: int, joint: int) -> bool:
-    from solver.body.skeleton import descendants
+    from markerscope.solver.core.skeleton import descendants
 
     return bool(descendants()[joint, bone])
 

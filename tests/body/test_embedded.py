@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from resources import resource
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS, PARENTS, mirror_index
-from solver.rotations import exp_so3
-from solver.video.landmarks import LANDMARKS
+from markerscope.resources import resource
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.landmarks import LANDMARKS
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX, JOINTS, PARENTS, mirror_index
 
 FILE = resource("body", "anny_24.npz")
 MIRROR = np.array([-1.0, 1, 1])

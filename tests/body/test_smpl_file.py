@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import scipy.sparse
 
-from solver.body.skeleton import PARENTS
-from solver.body.smpl_file import read_smpl_file
-from solver.errors import InputError
+from markerscope.solver.body.smpl_file import read_smpl_file
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.skeleton import PARENTS
 
 VERTICES = 60
 

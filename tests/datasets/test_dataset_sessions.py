@@ -13,19 +13,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.datasets import sessions
-from solver.datasets.kitchen import BACKPACK, KITCHEN
-from solver.datasets.moyo import MOYO
-from solver.datasets.request import DatasetName, DatasetRequest, Options
-from solver.datasets.sessions import write_sessions
-from solver.datasets.umpm import UMPM
-from solver.errors import InputError
-from solver.io.export_c3d import write_c3d
-from solver.io.markers_in import load_markers
-from solver.io.motion_in import read_motion
-from solver.markers import Markers
-from solver.pipeline.session import load_session
-from solver.video.frames import index_video, read_frames
+from markerscope.solver.commands import dataset as sessions
+from markerscope.solver.commands.dataset import write_sessions
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.datasets.kitchen import BACKPACK, KITCHEN
+from markerscope.solver.datasets.moyo import MOYO
+from markerscope.solver.datasets.request import DatasetName, DatasetRequest, Options
+from markerscope.solver.datasets.umpm import UMPM
+from markerscope.solver.io.export_c3d import write_c3d
+from markerscope.solver.io.markers_in import load_markers
+from markerscope.solver.io.motion_in import read_motion
+from markerscope.solver.pipeline.session import load_session
+from markerscope.solver.video.frames import index_video, read_frames
 
 SECONDS = 4.0
 
@@ -359,7 +359,7 @@ def test_all_sessions_are_written_or_none(tmp_path: Path, monkeypatch: pytest.Mo
             raise InputError("the disk is full")
         return False, ""
 
-    monkeypatch.setattr("solver.datasets.sessions.write_reference", fail)
+    monkeypatch.setattr("markerscope.solver.commands.dataset.write_reference", fail)
     for out in (tmp_path / "out", tmp_path / "new"):
         calls.clear()
         with pytest.raises(InputError, match="the disk is full"):

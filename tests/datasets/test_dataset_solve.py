@@ -9,19 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.body.model import Body
-from solver.datasets import sessions
-from solver.datasets.request import DatasetRequest
-from solver.datasets.sessions import write_sessions
-from solver.datasets.umpm import UMPM
-from solver.io.export_c3d import write_c3d
-from solver.io.motion_in import read_motion
-from solver.markers import Markers
-from solver.metrics import points_at
-from solver.pipeline.request import SolveRequest
-from solver.pipeline.session import load_session, save_session
-from solver.pipeline.solve import solve_session
-from tests.solve.conftest import simulate
+from markerscope.solver.body.model import Body
+from markerscope.solver.commands import dataset as sessions
+from markerscope.solver.commands.dataset import write_sessions
+from markerscope.solver.commands.solve import solve_session
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.metrics import points_at
+from markerscope.solver.core.request import SolveRequest
+from markerscope.solver.datasets.request import DatasetRequest
+from markerscope.solver.datasets.umpm import UMPM
+from markerscope.solver.io.export_c3d import write_c3d
+from markerscope.solver.io.motion_in import read_motion
+from markerscope.solver.pipeline.session import load_session, save_session
+from tests.fit.conftest import simulate
 from tests.synthetic import QUICK, record
 
 
@@ -57,6 +57,6 @@ def test_a_window_is_solved_and_lands_on_the_recordings_clock(
 
 @pytest.fixture(scope="module")
 def free_body() -> Body:
-    from solver.body.bones import with_bone_lengths
+    from markerscope.solver.body.bones import with_bone_lengths
 
     return with_bone_lengths(Body.load())

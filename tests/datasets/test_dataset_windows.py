@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.datasets.recording import RATE
-from solver.datasets.windows import cut, from_zero, starts
-from solver.markers import Markers
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.datasets.recording import RATE
+from markerscope.solver.datasets.windows import cut, from_zero, starts
 
 
 def recorded(rate: float, seconds: float) -> Markers:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from solver.markers import Markers, UpAxis, lab_rotation
+from markerscope.solver.core.markers import Markers, UpAxis, lab_rotation
 
 RecordingMaker = Callable[..., Markers]
 

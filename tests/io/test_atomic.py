@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.errors import InputError
-from solver.io.atomic import atomic_path, make_folder, write_bytes_atomic, write_text_atomic
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.atomic import atomic_path, make_folder, write_bytes_atomic, write_text_atomic
 
 
 def test_replaces_the_old_file_and_leaves_nothing_else(tmp_path: Path) -> None:

@@ -15,18 +15,18 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from solver.errors import InputError
-from solver.io import list_subjects, load_markers
-from solver.io.asf_amc import read_asf_amc
-from solver.io.bvh import read_bvh
-from solver.io.export_bvh import write_bvh
-from solver.io.export_c3d import write_c3d
-from solver.io.export_csv import write_markers_csv
-from solver.io.export_mot import write_mot
-from solver.io.export_smpl import write_smpl_npz
-from solver.io.export_trc import write_trc
-from solver.io.mot import read_mot
-from solver.markers import Markers
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.io import list_subjects, load_markers
+from markerscope.solver.io.asf_amc import read_asf_amc
+from markerscope.solver.io.bvh import read_bvh
+from markerscope.solver.io.export_bvh import write_bvh
+from markerscope.solver.io.export_c3d import write_c3d
+from markerscope.solver.io.export_csv import write_markers_csv
+from markerscope.solver.io.export_mot import write_mot
+from markerscope.solver.io.export_smpl import write_smpl_npz
+from markerscope.solver.io.export_trc import write_trc
+from markerscope.solver.io.mot import read_mot
 
 WRITERS: dict[str, Callable[[Path, Markers], None]] = {
     ".c3d": write_c3d,
@@ -168,12 +168,12 @@ def test_a_disk_that_is_full(tmp_path: Path) -> None:
         import resource, sys
         from pathlib import Path
         import numpy as np
-        from solver.errors import InputError
-        from solver.io.export_c3d import write_c3d
-        from solver.io.export_csv import write_markers_csv
-        from solver.io.export_smpl import write_smpl_npz
-        from solver.io.export_trc import write_trc
-        from solver.markers import Markers
+        from markerscope.solver.core.errors import InputError
+        from markerscope.solver.io.export_c3d import write_c3d
+        from markerscope.solver.io.export_csv import write_markers_csv
+        from markerscope.solver.io.export_smpl import write_smpl_npz
+        from markerscope.solver.io.export_trc import write_trc
+        from markerscope.solver.core.markers import Markers
         resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000))
         markers = Markers(np.random.default_rng(0).normal(size=(300, 9, 3)), 100.0, tuple("abcdefghi"))
         out = Path(sys.argv[1])

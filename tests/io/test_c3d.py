@@ -13,11 +13,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from solver.errors import InputError
-from solver.io import list_subjects, load_markers
-from solver.io.c3d import read_c3d
-from solver.io.export_c3d import write_c3d
-from solver.markers import Markers
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.io import list_subjects, load_markers
+from markerscope.solver.io.c3d import read_c3d
+from markerscope.solver.io.export_c3d import write_c3d
 
 relaxed = settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 REAL = [

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from solver.errors import InputError
-from solver.io import load_markers
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io import load_markers
 from tests.io.c3d_bytes import c3d_bytes
 
 relaxed = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from solver.clean.command import clean_file
-from solver.clean.request import CleanRequest
-from solver.io import load_markers
-from solver.io.c3d_format import decode_c3d
-from solver.io.c3d_keep import Original, kept_or_plain, write_c3d_like
-from solver.markers import Markers
+from markerscope.solver.cleaning.request import CleanRequest
+from markerscope.solver.commands.clean import clean_file
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.io import load_markers
+from markerscope.solver.io.c3d_format import decode_c3d
+from markerscope.solver.io.c3d_keep import Original, kept_or_plain, write_c3d_like
 from tests.io.c3d_bytes import c3d_bytes
 from tests.io.test_c3d_contradictions import TURNS, walk
 

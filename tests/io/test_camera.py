@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from solver.errors import InputError
-from solver.io.camera import camera_file, read_camera, resized, write_camera
-from solver.solve.results import CameraResult
+from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.camera import camera_file, read_camera, resized, write_camera
 
 
 @pytest.fixture

@@ -12,15 +12,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.errors import InputError
-from solver.io import list_subjects, load_markers
-from solver.io.export_csv import write_markers_csv
-from solver.io.export_trc import write_trc
-from solver.io.labels import computed_by_name, unique
-from solver.io.units import cloud_size, metres_per_unit, settle_units
-from solver.io.up_axis import vertical_scores
-from solver.markers import Markers, UpAxis
-from solver.markers_check import require_solvable
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers, UpAxis
+from markerscope.solver.core.markers_check import require_solvable
+from markerscope.solver.io import list_subjects, load_markers
+from markerscope.solver.io.export_csv import write_markers_csv
+from markerscope.solver.io.export_trc import write_trc
+from markerscope.solver.io.labels import computed_by_name, unique
+from markerscope.solver.io.units import cloud_size, metres_per_unit, settle_units
+from markerscope.solver.io.up_axis import vertical_scores
 
 # What is known of the real files apart from what they say: frames, markers, Hz, percent lost, and the vertical axis
 # of the file.

@@ -11,16 +11,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from solver.body.skeleton import JOINTS, PARENTS
-from solver.errors import InputError
-from solver.io import load_markers
-from solver.io.asf_amc import read_asf_amc
-from solver.io.bvh import read_bvh
-from solver.io.export_bvh import write_bvh
-from solver.io.export_mot import write_mot
-from solver.io.export_smpl import write_smpl_npz
-from solver.io.mot import read_mot
-from solver.io.motion import euler_matrix
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.skeleton import JOINTS, PARENTS
+from markerscope.solver.io import load_markers
+from markerscope.solver.io.asf_amc import read_asf_amc
+from markerscope.solver.io.bvh import read_bvh
+from markerscope.solver.io.export_bvh import write_bvh
+from markerscope.solver.io.export_mot import write_mot
+from markerscope.solver.io.export_smpl import write_smpl_npz
+from markerscope.solver.io.mot import read_mot
+from markerscope.solver.io.motion import euler_matrix
 
 relaxed = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.errors import InputError
-from solver.io.movie import write_movie
-from solver.video.frames import index_video, read_frames
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.movie import write_movie
+from markerscope.solver.video.frames import index_video, read_frames
 
 
 def pictures(count: int, height: int, width: int) -> list[np.ndarray]:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from solver.io import list_subjects, load_markers
-from solver.io.export_trc import write_trc
-from solver.io.labels import subjects_of
-from solver.markers import Markers
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.io import list_subjects, load_markers
+from markerscope.solver.io.export_trc import write_trc
+from markerscope.solver.io.labels import subjects_of
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.clean.command import clean_file
-from solver.clean.request import CleanRequest
-from solver.io import load_markers
-from solver.io.export_trc import write_trc
-from solver.io.units import settle_units
-from solver.markers import Markers
+from markerscope.solver.cleaning.request import CleanRequest
+from markerscope.solver.commands.clean import clean_file
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.io import load_markers
+from markerscope.solver.io.export_trc import write_trc
+from markerscope.solver.io.units import settle_units
 from tests.io.c3d_bytes import c3d_bytes
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}

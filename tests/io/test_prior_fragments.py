@@ -12,11 +12,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from solver.errors import InputError
-from solver.io.mot import read_mot
-from solver.io.motion_in import read_motion
-from solver.io.priors import load_prior
-from solver.rotations import exp_so3
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.io.mot import read_mot
+from markerscope.solver.io.motion_in import read_motion
+from markerscope.solver.io.priors import load_prior
 
 relaxed = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 FRAMES = 40

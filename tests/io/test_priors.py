@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from solver.body.skeleton import INDEX, PARENTS
-from solver.errors import InputError
-from solver.io.priors import load_prior
-from solver.prior import PosePrior
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.core.skeleton import INDEX, PARENTS
+from markerscope.solver.io.priors import load_prior
 
 FRAMES = 12
 

@@ -23,9 +23,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.errors import InputError
-from solver.io.safe_pickle import Sparse, load_untrusted
-from solver.io.safe_pickle.limits import Damaged, Forbidden
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.safe_pickle import Sparse, load_untrusted
+from markerscope.solver.safe_pickle.limits import Damaged, Forbidden
 
 RNG = np.random.default_rng(0)
 STRUCTURED = np.array([(1, 2.5), (3, 4.5)], dtype=[("a", "i4"), ("b", "f8")])

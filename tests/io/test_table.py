@@ -12,10 +12,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from solver.errors import InputError
-from solver.io import list_subjects, load_markers
-from solver.io.export_csv import write_markers_csv
-from solver.markers import Markers
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.io import list_subjects, load_markers
+from markerscope.solver.io.export_csv import write_markers_csv
 
 relaxed = settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 

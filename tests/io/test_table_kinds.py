@@ -11,8 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from solver.errors import InputError
-from solver.io import list_subjects, load_markers
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io import list_subjects, load_markers
 
 relaxed = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 NAMES = ["HEAD", "C7", "LSHO", "RSHO", "LKNE", "RTOE"]

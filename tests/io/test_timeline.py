@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.io.timeline import even_grid
+from markerscope.solver.io.timeline import even_grid
 
 
 @given(

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.errors import InputError
-from solver.io.together import together
-from solver.plain import json_text, plain, shown
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.plain import json_text, plain, shown
+from markerscope.solver.io.together import together
 
 
 def held(folder: Path) -> dict[str, str]:

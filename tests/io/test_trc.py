@@ -11,12 +11,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from solver.errors import InputError
-from solver.io import load_markers
-from solver.io.export_trc import write_trc
-from solver.io.filled_list import filled_list_path
-from solver.io.trc import read_trc
-from solver.markers import Markers
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.io import load_markers
+from markerscope.solver.io.export_trc import write_trc
+from markerscope.solver.io.filled_list import filled_list_path
+from markerscope.solver.io.trc import read_trc
 
 relaxed = settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 

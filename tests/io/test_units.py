@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.io.units import cloud_size, settle_units
+from markerscope.solver.io.units import cloud_size, settle_units
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 

@@ -8,21 +8,21 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from solver.body.model import Body, chain
-from solver.body.skeleton import INDEX
-from solver.neural import agnostic_solve
-from solver.neural.agnostic import Agnostic, AgnosticSettings, Frames
-from solver.neural.agnostic_align import align_to_rest
-from solver.neural.agnostic_examples import CLEAN, Spoiling, Task, any_layout, told
-from solver.neural.agnostic_layouts import Skin
-from solver.neural.agnostic_solve import Marked, Ready, solve_frames
-from solver.neural.agnostic_trust import blended, expected_errors
-from solver.neural.examples import ExampleSettings, Sampler, body_pool, generator
-from solver.neural.library import procedural_clips
-from solver.neural.pretrain import judged_on, objective
-from solver.neural.train import TrainSettings, train
-from solver.neural.weights import Card
-from solver.rotations import exp_so3
+from markerscope.solver.body.model import Body, chain
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.neural.layout_free import agnostic_solve
+from markerscope.solver.neural.layout_free.agnostic import Agnostic, AgnosticSettings, Frames
+from markerscope.solver.neural.layout_free.agnostic_align import align_to_rest
+from markerscope.solver.neural.layout_free.agnostic_examples import CLEAN, Spoiling, Task, any_layout, told
+from markerscope.solver.neural.layout_free.agnostic_layouts import Skin
+from markerscope.solver.neural.layout_free.agnostic_solve import Marked, Ready, solve_frames
+from markerscope.solver.neural.layout_free.agnostic_trust import blended, expected_errors
+from markerscope.solver.neural.layout_free.pretrain import judged_on, objective
+from markerscope.solver.neural.training.examples import ExampleSettings, Sampler, body_pool, generator
+from markerscope.solver.neural.training.library import procedural_clips
+from markerscope.solver.neural.training.train import TrainSettings, train
+from markerscope.solver.neural.weights import Card
 
 torch = pytest.importorskip("torch", reason="networks need torch")
 

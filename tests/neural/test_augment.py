@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.clean.gap_model import heavy_tailed, read_gap_statistics
-from solver.clean.gaps import find_gaps
-from solver.neural.augment import Augmentation, FrameNoise, augmented, corrupted, gap_bank
-from solver.neural.examples import generator
+from markerscope.solver.cleaning.gap_model import heavy_tailed, read_gap_statistics
+from markerscope.solver.cleaning.gaps import find_gaps
+from markerscope.solver.neural.augment import Augmentation, FrameNoise, augmented, corrupted, gap_bank
+from markerscope.solver.neural.training.examples import generator
 
 torch = pytest.importorskip("torch", reason="torch is not installed here")
 

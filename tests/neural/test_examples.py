@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS, mirror_index
-from solver.errors import InputError
-from solver.neural import kinematics
-from solver.neural.align import align, frame_weights, into, out_of
-from solver.neural.examples import ExampleSettings, Sampler, body_pool, generator
-from solver.neural.layout import LAYOUTS, named_layout, session_layout
-from solver.neural.library import Clip, by_kind, kind_of, load_library, procedural_clips
-from solver.neural.procedural import free_motion
-from solver.rotations import exp_so3, log_so3
-from solver.solve.results import FittedMotion
-from solver.synth.body import vary_body
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.rotations import exp_so3, log_so3
+from markerscope.solver.core.skeleton import INDEX, JOINTS, mirror_index
+from markerscope.solver.fit.results import FittedMotion
+from markerscope.solver.neural import kinematics
+from markerscope.solver.neural.align import align, frame_weights, into, out_of
+from markerscope.solver.neural.layout import LAYOUTS, named_layout, session_layout
+from markerscope.solver.neural.training.examples import ExampleSettings, Sampler, body_pool, generator
+from markerscope.solver.neural.training.library import Clip, by_kind, kind_of, load_library, procedural_clips
+from markerscope.solver.neural.training.procedural import free_motion
+from markerscope.solver.synth.body import vary_body
 
 torch = pytest.importorskip("torch", reason="torch is not installed here")
 

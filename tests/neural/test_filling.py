@@ -9,22 +9,31 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.body.model import Body
-from solver.clean.fill import fill
-from solver.clean.fill.network import fill_by_network
-from solver.clean.gap_model import draw_gaps, heavy_tailed
-from solver.clean.gaps import FillSettings
-from solver.errors import InputError
-from solver.neural import filling
-from solver.neural.examples import ExampleSettings, Sampler, body_pool, generator
-from solver.neural.fill_file import load_fill_network, save_fill_network
-from solver.neural.filling import FillNetwork, FillTask, completed, fill_bank, fill_network, new_occlusion, say, worth
-from solver.neural.layers import Params
-from solver.neural.layout import Layout, named_layout
-from solver.neural.library import procedural_clips
-from solver.neural.occlusion import OVERLAP, WINDOW, Occlusion, corrected, windows
-from solver.neural.train import TrainSettings, train
-from solver.neural.weights import Card
+from markerscope.solver.body.model import Body
+from markerscope.solver.cleaning.fill import fill
+from markerscope.solver.cleaning.gap_model import draw_gaps, heavy_tailed
+from markerscope.solver.cleaning.gaps import FillSettings
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.neural.layers import Params
+from markerscope.solver.neural.layout import Layout, named_layout
+from markerscope.solver.neural.per_layout import filling
+from markerscope.solver.neural.per_layout.fill_by_weights import fill_by_network
+from markerscope.solver.neural.per_layout.fill_file import load_fill_network, save_fill_network
+from markerscope.solver.neural.per_layout.filling import (
+    FillNetwork,
+    FillTask,
+    completed,
+    fill_bank,
+    fill_network,
+    new_occlusion,
+    say,
+    worth,
+)
+from markerscope.solver.neural.per_layout.occlusion import OVERLAP, WINDOW, Occlusion, corrected, windows
+from markerscope.solver.neural.training.examples import ExampleSettings, Sampler, body_pool, generator
+from markerscope.solver.neural.training.library import procedural_clips
+from markerscope.solver.neural.training.train import TrainSettings, train
+from markerscope.solver.neural.weights import Card
 
 torch = pytest.importorskip("torch", reason="torch is not installed here")
 

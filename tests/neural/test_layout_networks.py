@@ -10,38 +10,40 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli import main
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.body.skeleton import INDEX
-from solver.clean.fill.network import fill_by_weights
-from solver.errors import Cancelled, InputError
-from solver.io import load_markers
-from solver.io.export_c3d import write_c3d
-from solver.markers import Markers
-from solver.neural import filling, named, site, training
-from solver.neural.agnostic_solve import Marked
-from solver.neural.agnostic_trust import made_poses
-from solver.neural.command import train_network
-from solver.neural.examples import ExampleSettings, Sampler, body_pool, generator
-from solver.neural.fill_file import load_fill_network
-from solver.neural.filling import FillNetwork
-from solver.neural.layout import Layout, named_layout
-from solver.neural.library import procedural_clips
-from solver.neural.metrics import joe
-from solver.neural.named import NeuralMotion, Solver, load_solver
-from solver.neural.places import columns_of
-from solver.neural.posing import OneLayout, pose_network
-from solver.neural.request import TrainRequest
-from solver.neural.weights import read_card
-from solver.pipeline import solve_session
-from solver.pipeline.request import SolveRequest
-from solver.pipeline.run import run_stages
-from solver.pipeline.session import load_session
-from solver.progress import silent
-from solver.rotations import log_so3
-from solver.synth.files import MARKERS, PRIOR, write_session
-from solver.synth.session import SynthSettings, synthesise
+from markerscope.app.cli.main import main
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.commands import solve_session
+from markerscope.solver.commands import train_site as site
+from markerscope.solver.commands import trainings as training
+from markerscope.solver.commands.train import train_network
+from markerscope.solver.core.errors import Cancelled, InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.progress import silent
+from markerscope.solver.core.request import SolveRequest
+from markerscope.solver.core.rotations import log_so3
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.io import load_markers
+from markerscope.solver.io.export_c3d import write_c3d
+from markerscope.solver.neural.layout import Layout, named_layout
+from markerscope.solver.neural.layout_free.agnostic_solve import Marked
+from markerscope.solver.neural.layout_free.agnostic_trust import made_poses
+from markerscope.solver.neural.metrics import joe
+from markerscope.solver.neural.per_layout import filling, named
+from markerscope.solver.neural.per_layout.fill_by_weights import fill_by_weights
+from markerscope.solver.neural.per_layout.fill_file import load_fill_network
+from markerscope.solver.neural.per_layout.filling import FillNetwork
+from markerscope.solver.neural.per_layout.named import NeuralMotion, Solver, load_solver
+from markerscope.solver.neural.places import columns_of
+from markerscope.solver.neural.posing import OneLayout, pose_network
+from markerscope.solver.neural.request import TrainRequest
+from markerscope.solver.neural.training.examples import ExampleSettings, Sampler, body_pool, generator
+from markerscope.solver.neural.training.library import procedural_clips
+from markerscope.solver.neural.weights import read_card
+from markerscope.solver.pipeline.run import run_stages
+from markerscope.solver.pipeline.session import load_session
+from markerscope.solver.synth.files import MARKERS, PRIOR, write_session
+from markerscope.solver.synth.session import SynthSettings, synthesise
 
 pytest.importorskip("torch", reason="networks need torch")
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.neural.metrics import angles_between, joe, jpe, ompe
-from solver.rotations import exp_so3
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.neural.metrics import angles_between, joe, jpe, ompe
 
 
 def test_marker_error_counts_hidden_samples_that_were_filled() -> None:

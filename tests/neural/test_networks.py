@@ -9,24 +9,31 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.body.skeleton import INDEX
-from solver.errors import InputError
-from solver.neural import kinematics
-from solver.neural.build import Choice, from_config, make_task
-from solver.neural.examples import ExampleSettings, Sampler, body_pool, generator
-from solver.neural.graph import Graph, build_graph, distance_deviation, nearest
-from solver.neural.heterogeneous import Sizes
-from solver.neural.holden import placed
-from solver.neural.layers import EdgeConvolution, Params
-from solver.neural.layout import Layout, named_layout
-from solver.neural.library import procedural_clips
-from solver.neural.named import groups_of, load_solver, save_solver, shape_of, solve, train_solver
-from solver.neural.solving import JOINTS_OF, Task, members
-from solver.neural.train import TrainSettings, train
-from solver.neural.weights import Card
-from solver.rotations import exp_so3
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.neural import kinematics
+from markerscope.solver.neural.graph import Graph, build_graph, distance_deviation, nearest
+from markerscope.solver.neural.layers import EdgeConvolution, Params
+from markerscope.solver.neural.layout import Layout, named_layout
+from markerscope.solver.neural.per_layout.build import Choice, from_config, make_task
+from markerscope.solver.neural.per_layout.heterogeneous import Sizes
+from markerscope.solver.neural.per_layout.holden import placed
+from markerscope.solver.neural.per_layout.named import (
+    groups_of,
+    load_solver,
+    save_solver,
+    shape_of,
+    solve,
+    train_solver,
+)
+from markerscope.solver.neural.per_layout.solving import JOINTS_OF, Task, members
+from markerscope.solver.neural.training.examples import ExampleSettings, Sampler, body_pool, generator
+from markerscope.solver.neural.training.library import procedural_clips
+from markerscope.solver.neural.training.train import TrainSettings, train
+from markerscope.solver.neural.weights import Card
 
 torch = pytest.importorskip("torch", reason="torch is not installed here")
 

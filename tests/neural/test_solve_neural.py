@@ -9,23 +9,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli import main
-from solver.body.model import Body
-from solver.errors import Cancelled, InputError
-from solver.neural.agnostic_solve import SHIPPED, load
-from solver.neural.command import train_network
-from solver.neural.metrics import joe, jpe
-from solver.neural.places import check_places, places_of
-from solver.neural.request import TrainRequest
-from solver.neural.weights import read_card, save_weights
-from solver.pipeline import solve_session
-from solver.pipeline.request import SolveRequest
-from solver.pipeline.run import run_stages
-from solver.pipeline.session import load_session
-from solver.progress import silent
-from solver.rotations import exp_so3
-from solver.synth.files import MARKERS, PRIOR, write_session
-from solver.synth.session import SynthSession, SynthSettings, synthesise
+from markerscope.app.cli.main import main
+from markerscope.solver.body.model import Body
+from markerscope.solver.commands import solve_session
+from markerscope.solver.commands.train import train_network
+from markerscope.solver.core.errors import Cancelled, InputError
+from markerscope.solver.core.progress import silent
+from markerscope.solver.core.request import SolveRequest
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.neural.layout_free.agnostic_solve import SHIPPED, load
+from markerscope.solver.neural.metrics import joe, jpe
+from markerscope.solver.neural.places import check_places, places_of
+from markerscope.solver.neural.request import TrainRequest
+from markerscope.solver.neural.weights import read_card, save_weights
+from markerscope.solver.pipeline.run import run_stages
+from markerscope.solver.pipeline.session import load_session
+from markerscope.solver.synth.files import MARKERS, PRIOR, write_session
+from markerscope.solver.synth.session import SynthSession, SynthSettings, synthesise
 
 pytest.importorskip("torch", reason="networks need torch")
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.errors import Cancelled, InputError
-from solver.neural.train import Params, TrainSettings, train
-from solver.neural.weights import Card, load_weights, read_card, save_weights
+from markerscope.solver.core.errors import Cancelled, InputError
+from markerscope.solver.neural.training.train import Params, TrainSettings, train
+from markerscope.solver.neural.weights import Card, load_weights, read_card, save_weights
 
 torch = pytest.importorskip("torch", reason="torch is not installed here")
 

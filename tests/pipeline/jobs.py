@@ -8,14 +8,14 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from solver.errors import InputError
-from solver.pipeline.inputs import LandmarkSettings
-from solver.pipeline.source import Source
-from solver.pipeline.stage import Event, NoSettings, Stage, run_graph
-from solver.pipeline.stages import GRAPH as SOLVE
-from solver.pipeline.store import Store
-from solver.progress import Found, part_of, tell
-from solver.video import watched
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.progress import Found, part_of, tell
+from markerscope.solver.pipeline.inputs import LandmarkSettings
+from markerscope.solver.pipeline.source import Source
+from markerscope.solver.pipeline.stage import Event, NoSettings, Stage, run_graph
+from markerscope.solver.pipeline.stages import GRAPH as SOLVE
+from markerscope.solver.pipeline.store import Store
+from markerscope.solver.video import watched
 
 LANDMARKS = tuple(stage for stage in SOLVE if stage.name == "landmarks")
 RARELY = {"landmarks": LandmarkSettings(rate=3.0)}

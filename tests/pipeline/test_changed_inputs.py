@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.errors import InputError
-from solver.pipeline import source as source_module
-from solver.pipeline.digest import file_digest
-from solver.pipeline.digest_cache import SMALL_BYTES, DigestCache
-from solver.pipeline.methods import GRAPHS
-from solver.pipeline.source import Source
-from solver.pipeline.stage import NoSettings, Stage, run_graph
-from solver.pipeline.stages import SOURCES
-from solver.pipeline.store import Store
-from solver.progress import Progress
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.progress import Progress
+from markerscope.solver.pipeline import source as source_module
+from markerscope.solver.pipeline.digest import file_digest
+from markerscope.solver.pipeline.digest_cache import SMALL_BYTES, DigestCache
+from markerscope.solver.pipeline.methods import GRAPHS
+from markerscope.solver.pipeline.source import Source
+from markerscope.solver.pipeline.stage import NoSettings, Stage, run_graph
+from markerscope.solver.pipeline.stages import SOURCES
+from markerscope.solver.pipeline.store import Store
 
 RIGHT, WRONG = b"right content", b"other content"
 READERS = [
@@ -174,7 +174,7 @@ def large(path: Path, content: bytes) -> bytes:
 def test_the_same_size_and_times_are_not_taken_for_the_same_content(
     tmp_path: Path, change: Callable[[Path, bytes], None], size: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("solver.pipeline.digest_cache._SETTLED_S", -1.0)
+    monkeypatch.setattr("markerscope.solver.pipeline.digest_cache._SETTLED_S", -1.0)
     path, much = tmp_path / "video", size == "large"
     first, other = bytearray(large(path, RIGHT) if much else RIGHT), bytearray(large(path, RIGHT) if much else RIGHT)
     other[len(other) // 3] ^= 1
@@ -191,8 +191,10 @@ def test_the_same_size_and_times_are_not_taken_for_the_same_content(
 
 
 def test_where_the_system_notes_no_change_samples_tell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("solver.pipeline.digest_cache._SETTLED_S", -1.0)
-    monkeypatch.setattr("solver.pipeline.digest_cache.stamp_of", lambda p: (0, 0, Path(p).stat().st_size, 0, 0))
+    monkeypatch.setattr("markerscope.solver.pipeline.digest_cache._SETTLED_S", -1.0)
+    monkeypatch.setattr(
+        "markerscope.solver.pipeline.digest_cache.stamp_of", lambda p: (0, 0, Path(p).stat().st_size, 0, 0)
+    )
     path = tmp_path / "video"
     content = np.random.default_rng(0).bytes(SMALL_BYTES + 1)
     path.write_bytes(content)
@@ -203,8 +205,10 @@ def test_where_the_system_notes_no_change_samples_tell(tmp_path: Path, monkeypat
 
 
 def test_a_small_file_is_read_whole_each_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("solver.pipeline.digest_cache._SETTLED_S", -1.0)
-    monkeypatch.setattr("solver.pipeline.digest_cache.stamp_of", lambda p: (0, 0, Path(p).stat().st_size, 0, 0))
+    monkeypatch.setattr("markerscope.solver.pipeline.digest_cache._SETTLED_S", -1.0)
+    monkeypatch.setattr(
+        "markerscope.solver.pipeline.digest_cache.stamp_of", lambda p: (0, 0, Path(p).stat().st_size, 0, 0)
+    )
     path = tmp_path / "prior"
     content = bytearray(4 << 20)
     path.write_bytes(content)

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as nps
 
-from solver.pipeline.codec import CodecError, decode, encode, type_name
+from markerscope.solver.pipeline.codec import CodecError, decode, encode, type_name
 
 
 @dataclass(frozen=True)

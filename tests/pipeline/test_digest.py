@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.errors import InputError
-from solver.pipeline import digest_cache
-from solver.pipeline.digest import digest_of, file_digest, result_key
-from solver.pipeline.digest_cache import DigestCache
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline import digest_cache
+from markerscope.solver.pipeline.digest import digest_of, file_digest, result_key
+from markerscope.solver.pipeline.digest_cache import DigestCache
 
 
 @dataclass(frozen=True)

@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.errors import InputError
-from solver.outputs import FILES
-from solver.pipeline import solve_session
-from solver.pipeline.methods import GRAPHS, graph_of, with_method
-from solver.pipeline.request import SolveRequest
-from solver.pipeline.session import RunSettings, Session, load_session, save_session
-from solver.pipeline.solve import session_of
-from solver.pipeline.stage import stage_keys
-from solver.pipeline.stages import SOURCES
-from solver.progress import silent
-from tests.solve.conftest import simulate
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.commands import solve_session
+from markerscope.solver.commands.solve import session_of
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.progress import silent
+from markerscope.solver.core.request import SolveRequest
+from markerscope.solver.pipeline.methods import GRAPHS, graph_of, with_method
+from markerscope.solver.pipeline.session import RunSettings, Session, load_session, save_session
+from markerscope.solver.pipeline.stage import stage_keys
+from markerscope.solver.pipeline.stages import SOURCES
+from markerscope.solver.report.outputs import FILES
+from tests.fit.conftest import simulate
 from tests.synthetic import Recording, record
 
 TINY = {"localize": {"yaws": 6, "few": 4, "many": 6, "keep": 3}, "orient": {"refine": 2}}

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.errors import InputError
-from solver.pipeline.session import (
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline.session import (
     FILE_NAME,
     InputFile,
     Session,
@@ -20,8 +20,8 @@ from solver.pipeline.session import (
     save_session,
     session_folder,
 )
-from solver.pipeline.settings import from_table, overlay, to_table
-from solver.pipeline.stage import Stage
+from markerscope.solver.pipeline.settings import from_table, overlay, to_table
+from markerscope.solver.pipeline.stage import Stage
 
 
 @dataclass(frozen=True)

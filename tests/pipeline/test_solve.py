@@ -12,30 +12,30 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.body.bones import with_bone_lengths
-from solver.body.model import EMBEDDED, Body
-from solver.errors import InputError
-from solver.io import load_markers
-from solver.io.export_c3d import write_c3d
-from solver.outputs import write_formats
-from solver.pipeline import solve_session
-from solver.pipeline import stage as stage_module
-from solver.pipeline.digest import file_digest
-from solver.pipeline.request import SolveRequest
-from solver.pipeline.run import run_stages
-from solver.pipeline.session import InputFile, load_session, save_session
-from solver.pipeline.session_file import EditedOutside, edited_by_hand
-from solver.pipeline.settings import from_table
-from solver.pipeline.solve import session_of
-from solver.pipeline.source import Source
-from solver.pipeline.stage import Event, stage_keys
-from solver.pipeline.stages import GRAPH, SOURCES
-from solver.pipeline.stages_neural import GRAPH_NEURAL
-from solver.pipeline.stages_paper import GRAPH_PAPER
-from solver.pipeline.worker import Job
-from solver.posed import body_of
-from solver.progress import silent
-from tests.solve.conftest import simulate
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import EMBEDDED, Body
+from markerscope.solver.commands import solve_session
+from markerscope.solver.commands.solve import session_of
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.progress import silent
+from markerscope.solver.core.request import SolveRequest
+from markerscope.solver.evaluate.posed import body_of
+from markerscope.solver.io import load_markers
+from markerscope.solver.io.export_c3d import write_c3d
+from markerscope.solver.pipeline import stage as stage_module
+from markerscope.solver.pipeline.digest import file_digest
+from markerscope.solver.pipeline.run import run_stages
+from markerscope.solver.pipeline.session import InputFile, load_session, save_session
+from markerscope.solver.pipeline.session_file import EditedOutside, edited_by_hand
+from markerscope.solver.pipeline.settings import from_table
+from markerscope.solver.pipeline.source import Source
+from markerscope.solver.pipeline.stage import Event, stage_keys
+from markerscope.solver.pipeline.stages import GRAPH, SOURCES
+from markerscope.solver.pipeline.stages_neural import GRAPH_NEURAL
+from markerscope.solver.pipeline.stages_paper import GRAPH_PAPER
+from markerscope.solver.pipeline.worker import Job
+from markerscope.solver.report.outputs import write_formats
+from tests.fit.conftest import simulate
 from tests.synthetic import Recording, record, session
 
 TINY = {"localize": {"yaws": 6, "few": 4, "many": 6, "keep": 3}, "orient": {"refine": 2}}
@@ -280,7 +280,7 @@ def test_outputs_change_all_together_or_not_at_all(mine: Path, monkeypatch: pyte
     def full(*_: Any) -> None:
         raise InputError("cannot be written: the disk is full", "report.html", "free some space")
 
-    monkeypatch.setattr("solver.report_of.report_of", full)
+    monkeypatch.setattr("markerscope.solver.report.report_of.report_of", full)
     with pytest.raises(InputError, match="disk is full"):
         solve_session(SolveRequest(mine, convention="isb"), silent)
     after = content(mine)
@@ -292,7 +292,7 @@ def test_outputs_change_all_together_or_not_at_all(mine: Path, monkeypatch: pyte
 def test_a_refusal_leaves_nothing_but_what_took_long(
     made: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, worth: float
 ) -> None:
-    monkeypatch.setattr("solver.pipeline.solve._WORTH_KEEPING_S", worth)
+    monkeypatch.setattr("markerscope.solver.commands.solve._WORTH_KEEPING_S", worth)
     request = SolveRequest(made.markers, out=tmp_path / "out", prior=made.prior, offset=100.0)
     with pytest.raises(InputError, match="at no time of the markers"):
         solve_session(request, silent)

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.errors import Cancelled, InputError
-from solver.pipeline.source import Source
-from solver.pipeline.stage import Event, NoSettings, Stage, run_graph, shares, stage_keys, stage_states
-from solver.pipeline.store import Store
-from solver.progress import Found, part_of, tell
+from markerscope.solver.core.errors import Cancelled, InputError
+from markerscope.solver.core.progress import Found, part_of, tell
+from markerscope.solver.pipeline.source import Source
+from markerscope.solver.pipeline.stage import Event, NoSettings, Stage, run_graph, shares, stage_keys, stage_states
+from markerscope.solver.pipeline.store import Store
 
 
 @dataclass(frozen=True)

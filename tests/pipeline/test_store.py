@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.errors import InputError
-from solver.pipeline import store as store_module
-from solver.pipeline.store import Absent, Store
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline import store as store_module
+from markerscope.solver.pipeline.store import Absent, Store
 
 KEY = "0" * 32
 

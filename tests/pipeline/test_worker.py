@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from solver.errors import Cancelled, InputError
-from solver.pipeline.stage import Event
-from solver.pipeline.store import Store
-from solver.pipeline.worker import Failed, Finished, Job, Progressed, WorkerDied
-from solver.progress import Found
+from markerscope.solver.core.errors import Cancelled, InputError
+from markerscope.solver.core.progress import Found
+from markerscope.solver.pipeline.stage import Event
+from markerscope.solver.pipeline.store import Store
+from markerscope.solver.pipeline.worker import Failed, Finished, Job, Progressed, WorkerDied
 from tests.pipeline import jobs
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.body.model import Body
-from solver.body.skeleton import INDEX
-from solver.errors import InputError
-from solver.rotations import log_so3
-from solver.synth import Motion
-from solver.synth.acts import ACTS, act
-from solver.synth.motion import carried_over, damped, forth_and_back, on_floor, played
-from solver.synth.source import read_source
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.rotations import log_so3
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.synth import Motion
+from markerscope.solver.synth.acts import ACTS, act
+from markerscope.solver.synth.motion import carried_over, damped, forth_and_back, on_floor, played
+from markerscope.solver.synth.source import read_source
 
 RATE = 60.0
 ANKLES = [INDEX["left_ankle"], INDEX["right_ankle"]]

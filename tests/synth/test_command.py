@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from app import cli_synth
-from app.cli import main
-from app.cli_commands import Services
-from solver.pipeline.request import Outcome, SynthRequest
-from solver.progress import Progress
-from solver.synth.acts import ACTS
-from solver.synth.session import SynthSettings
+from markerscope.app.cli import synth as cli_synth
+from markerscope.app.cli.commands import Services
+from markerscope.app.cli.main import main
+from markerscope.solver.core.progress import Progress
+from markerscope.solver.core.request import Outcome, SynthRequest
+from markerscope.solver.synth.acts import ACTS
+from markerscope.solver.synth.session import SynthSettings
 
 
 def test_the_command_makes_what_solve_and_evaluate_take(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

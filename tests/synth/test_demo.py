@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from resources import resource
-from resources.make_demo import session
-from solver.body.model import Body, chain
-from solver.body.skeleton import INDEX, JOINTS
-from solver.errors import InputError
-from solver.io.markers_in import load_markers
-from solver.markers import Markers
-from solver.rotations import log_so3
-from solver.sync import find_offset
-from solver.synth import (
+from markerscope.resources import resource
+from markerscope.solver.body.model import Body, chain
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.landmarks import LANDMARKS, Landmarks
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.rotations import log_so3
+from markerscope.solver.core.skeleton import INDEX, JOINTS
+from markerscope.solver.io.markers_in import load_markers
+from markerscope.solver.sync.offset import find_offset
+from markerscope.solver.synth import (
     MARKERS_PER_BONE,
     Corruption,
     Motion,
@@ -27,11 +27,11 @@ from solver.synth import (
     place_markers,
     vary_body,
 )
-from solver.synth.truth import Truth, load_truth
-from solver.video.blazepose import track_pose
-from solver.video.flips import mend_flips
-from solver.video.frames import index_video
-from solver.video.landmarks import LANDMARKS, Landmarks
+from markerscope.solver.synth.truth import Truth, load_truth
+from markerscope.solver.video.blazepose import track_pose
+from markerscope.solver.video.flips import mend_flips
+from markerscope.solver.video.frames import index_video
+from tools.make_demo import session
 
 
 @pytest.fixture(scope="module")

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver import __version__
-from solver.errors import InputError
-from solver.evaluate import Posed, compare, evaluate
-from solver.io.markers_in import load_markers
-from solver.io.priors.load import load_prior
-from solver.synth import files
-from solver.synth.files import FILES, load_session, write_session
-from solver.synth.session import SynthSession, SynthSettings, synthesise
+from markerscope.solver import __version__
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.evaluate.evaluate import Posed, compare, evaluate
+from markerscope.solver.io.markers_in import load_markers
+from markerscope.solver.io.priors.load import load_prior
+from markerscope.solver.synth import files
+from markerscope.solver.synth.files import FILES, load_session, write_session
+from markerscope.solver.synth.session import SynthSession, SynthSettings, synthesise
 
 SETTINGS = SynthSettings(
     frames=60,
@@ -82,9 +82,9 @@ def test_the_truth_against_its_reference_is_no_error_at_all(folder: Path) -> Non
 
 def evaluate_nearest(folder: Path) -> float:
     """m, V2V of the reference in the nearest shape against the truth, by hand."""
-    from solver.body.bones import with_bone_lengths
-    from solver.body.model import Body
-    from solver.rotations import exp_so3
+    from markerscope.solver.body.bones import with_bone_lengths
+    from markerscope.solver.body.model import Body
+    from markerscope.solver.core.rotations import exp_so3
 
     with np.load(folder / "reference.npz") as data:
         shape = np.concatenate([data["betas"], data["bone_lengths"]])

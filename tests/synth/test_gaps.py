@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.clean.gap_statistics import GapStatistics, load_gap_statistics
-from solver.errors import InputError
-from solver.synth.gaps import gaps_like, heavy_tailed_gaps, hidden_by_chance
+from markerscope.solver.cleaning.gap_statistics import GapStatistics, load_gap_statistics
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.synth.gaps import gaps_like, heavy_tailed_gaps, hidden_by_chance
 
 
 def lengths_of(lost: np.ndarray) -> np.ndarray:

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.body.model import Body
-from solver.body.skeleton import mirror_index
-from solver.rotations import log_so3
-from solver.synth import Motion, demo_motion
-from solver.synth.prior import PriorError, corrupt_prior, left_for_right
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.rotations import log_so3
+from markerscope.solver.core.skeleton import mirror_index
+from markerscope.solver.synth import Motion, demo_motion
+from markerscope.solver.synth.prior import PriorError, corrupt_prior, left_for_right
 
 SIDES = mirror_index()
 

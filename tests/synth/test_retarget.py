@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS, PARENTS
-from solver.errors import InputError
-from solver.io.asf_amc import read_asf_amc
-from solver.io.bvh import read_bvh
-from solver.io.motion import SkeletonMotion
-from solver.rotations import exp_so3, log_so3
-from solver.synth.demo_motion import demo_motion
-from solver.synth.retarget import match_joints, retarget
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.rotations import exp_so3, log_so3
+from markerscope.solver.core.skeleton import INDEX, JOINTS, PARENTS
+from markerscope.solver.io.asf_amc import read_asf_amc
+from markerscope.solver.io.bvh import read_bvh
+from markerscope.solver.io.motion import SkeletonMotion
+from markerscope.solver.synth.demo_motion import demo_motion
+from markerscope.solver.synth.retarget import match_joints, retarget
 
 FILES = (
     "cmu/02_01.amc",

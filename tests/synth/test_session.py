@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS, PARTS
-from solver.errors import InputError
-from solver.rotations import log_so3
-from solver.synth import demo_motion
-from solver.synth.files import nearest_shape
-from solver.synth.session import SynthSession, SynthSettings, synthesise
-from solver.synth.source import read_source
-from solver.synth.swaps import holders
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.rotations import log_so3
+from markerscope.solver.core.skeleton import INDEX, JOINTS, PARTS
+from markerscope.solver.synth import demo_motion
+from markerscope.solver.synth.files import nearest_shape
+from markerscope.solver.synth.session import SynthSession, SynthSettings, synthesise
+from markerscope.solver.synth.source import read_source
+from markerscope.solver.synth.swaps import holders
 
 PLAIN = SynthSettings(frames=90)
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS, PARTS
-from solver.errors import InputError
-from solver.synth import demo_motion, vary_body
-from solver.synth.layouts import LAYOUTS, named_sites
-from solver.synth.sites import markable, site_paths, uniform_sites
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.skeleton import INDEX, JOINTS, PARTS
+from markerscope.solver.synth import demo_motion, vary_body
+from markerscope.solver.synth.layouts import LAYOUTS, named_sites
+from markerscope.solver.synth.sites import markable, site_paths, uniform_sites
 
 FLAT = np.zeros(10)
 

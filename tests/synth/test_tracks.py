@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.synth.ghosts import ghosts
-from solver.synth.swaps import draw_swaps, holders
+from markerscope.solver.synth.ghosts import ghosts
+from markerscope.solver.synth.swaps import draw_swaps, holders
 
 RATE = 30.0
 

@@ -12,13 +12,13 @@ import cv2
 import numpy as np
 import pytest
 
-from resources import resource
-from solver.errors import Cancelled, InputError
-from solver.video import blazepose_models
-from solver.video.blazepose import Region, Tracker, track_pose
-from solver.video.blazepose_models import _anchors, _refined, _weighted_suppression
-from solver.video.frames import read_frames
-from solver.video.landmarks import LANDMARKS, Landmarks
+from markerscope.resources import resource
+from markerscope.solver.core.errors import Cancelled, InputError
+from markerscope.solver.core.landmarks import LANDMARKS, Landmarks
+from markerscope.solver.video import blazepose_models
+from markerscope.solver.video.blazepose import Region, Tracker, track_pose
+from markerscope.solver.video.blazepose_models import _anchors, _refined, _weighted_suppression
+from markerscope.solver.video.frames import read_frames
 
 
 def column(name: str) -> int:

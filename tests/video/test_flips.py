@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.video.flips import GROUPS, mend_flips
-from solver.video.landmarks import LANDMARKS, Landmarks
+from markerscope.solver.core.landmarks import LANDMARKS, Landmarks
+from markerscope.solver.video.flips import GROUPS, mend_flips
 
 EVERY = tuple(GROUPS)
 

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
-from solver.errors import InputError
-from solver.video.frames import FrameReader, index_video, read_frames
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.video.frames import FrameReader, index_video, read_frames
 
 WIDTH, HEIGHT = 160, 96
 TICK = Fraction(1, 1000)

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.body.model import Body
-from solver.body.skeleton import INDEX
-from solver.errors import InputError
-from solver.prior import PosePrior
-from solver.rotations import exp_so3, log_so3
-from solver.solve import anatomical
-from solver.video.landmarks import Landmarks
-from solver.video.lift import lift
-from solver.video.shadow import landmarks_of_prior
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.landmarks import Landmarks
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.core.rotations import exp_so3, log_so3
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.fit import anatomical
+from markerscope.solver.fit.lift import lift
+from markerscope.solver.fit.shadow import landmarks_of_prior
 
 LIMBS = [INDEX[f"{s}_{j}"] for s in ("left", "right") for j in ("hip", "knee", "shoulder", "elbow")]
 FRAMES = 24

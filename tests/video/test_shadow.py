@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS
-from solver.prior import PosePrior
-from solver.rotations import exp_so3
-from solver.video.landmarks import LANDMARKS
-from solver.video.shadow import landmarks_of_prior
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.landmarks import LANDMARKS
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX, JOINTS
+from markerscope.solver.fit.shadow import landmarks_of_prior
 
 
 def test_a_raised_arm_goes_up_in_the_picture_and_lost_frames_show_nothing() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.video.upright import IDENTITY, Upright
+from markerscope.solver.video.upright import IDENTITY, Upright
 
 PICTURE = np.arange(2 * 3 * 1).reshape(2, 3, 1)
 """2 rows of 3 pixels."""

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from resources import resource
-from solver.errors import Cancelled, InputError
-from solver.pipeline.source import Source
-from solver.pipeline.stage import run_graph
-from solver.pipeline.store import Store
-from solver.pipeline.worker import Job, WorkerDied
-from solver.progress import Progress, silent
-from solver.video import blazepose, watched
-from solver.video.landmarks import Landmarks
+from markerscope.resources import resource
+from markerscope.solver.core.errors import Cancelled, InputError
+from markerscope.solver.core.landmarks import Landmarks
+from markerscope.solver.core.progress import Progress, silent
+from markerscope.solver.pipeline.source import Source
+from markerscope.solver.pipeline.stage import run_graph
+from markerscope.solver.pipeline.store import Store
+from markerscope.solver.pipeline.worker import Job, WorkerDied
+from markerscope.solver.video import blazepose, watched
 from tests.pipeline import jobs
 
 VIDEO = resource("demo", "video.mp4")

@@ -10,7 +10,7 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
-from widgets.scene import Scene3D
+from markerscope.widgets.scene import Scene3D
 
 NO_KEY = Qt.KeyboardModifier.NoModifier
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from PySide6.QtCore import Qt
 
-from widgets.images import to_rgb
-from widgets.scene import Scene3D
+from markerscope.widgets.images import to_rgb
+from markerscope.widgets.scene import Scene3D
 
 RED, GREEN, BLUE = (213, 94, 0), (0, 158, 115), (0, 114, 178)
 SHIFT, CONTROL = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier

@@ -12,11 +12,11 @@ from PySide6.QtWidgets import QApplication
 from scipy.cluster.hierarchy import fcluster, leaves_list, linkage
 from scipy.spatial.distance import squareform
 
+from markerscope.widgets import palette, theme
+from markerscope.widgets.plots.affinity import AffinityView
+from markerscope.widgets.plots.dendrogram import Dendrogram, blocks
+from markerscope.widgets.plots.pair import PairPlot
 from tests.widgets.drawn import distance, pixels, shows
-from widgets import palette, theme
-from widgets.plots.affinity import AffinityView
-from widgets.plots.dendrogram import Dendrogram, blocks
-from widgets.plots.pair import PairPlot
 
 # Markers 0, 2, 4 are one group, 1 and 3 another; 5 was never seen and is no leaf.
 MATRIX = np.full((6, 6), 0.060)

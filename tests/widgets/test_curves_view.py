@@ -11,18 +11,18 @@ from PySide6.QtGui import QColor, QImage, QPainter
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel
 
+from markerscope.widgets import palette, theme
+from markerscope.widgets.gallery.panels import hypotheses
+from markerscope.widgets.images import to_rgb
+from markerscope.widgets.panels.energy_bars import EnergyBar
+from markerscope.widgets.panels.hypotheses import HypothesesView
+from markerscope.widgets.panels.transport import Readout, Transport
+from markerscope.widgets.plots.angle_data import AngleCurve, AnglePlot
+from markerscope.widgets.plots.angle_plots import _broken
+from markerscope.widgets.plots.convergence import ConvergenceView, EnergyCurve
+from markerscope.widgets.plots.curves import CurvesView
+from markerscope.widgets.plots.ink import pen, polyline
 from tests.widgets.drawn import distance, pixels
-from widgets import palette, theme
-from widgets.gallery_panels import hypotheses
-from widgets.images import to_rgb
-from widgets.panels.energy_bars import EnergyBar
-from widgets.panels.hypotheses import HypothesesView
-from widgets.panels.transport import Readout, Transport
-from widgets.plots.angle_data import AngleCurve, AnglePlot
-from widgets.plots.angle_plots import _broken
-from widgets.plots.convergence import ConvergenceView, EnergyCurve
-from widgets.plots.curves import CurvesView
-from widgets.plots.ink import pen, polyline
 
 TIME = np.arange(400) / 100
 

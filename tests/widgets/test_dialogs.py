@@ -12,22 +12,22 @@ from PySide6.QtGui import QDropEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
+from markerscope.widgets import theme
+from markerscope.widgets.boxes import ChoiceBox
+from markerscope.widgets.dialogs.command_palette import CommandPalette
+from markerscope.widgets.dialogs.export_dialog import ExportDialog
+from markerscope.widgets.dialogs.fuzzy import score
+from markerscope.widgets.dialogs.import_data import ImportChoice, ImportShown
+from markerscope.widgets.dialogs.import_dialog import ImportDialog
+from markerscope.widgets.dialogs.points_preview import PointsPreview
+from markerscope.widgets.dialogs.shortcut_sheet import ShortcutSheet
+from markerscope.widgets.gallery.dialogs import ENTRIES, FORMATS
+from markerscope.widgets.panels.history import HistoryList
+from markerscope.widgets.panels.message_bar import Message, MessageBar
+from markerscope.widgets.panels.progress_strip import ProgressStrip
+from markerscope.widgets.panels.stage_data import StageProgress
+from markerscope.widgets.panels.welcome import Recent, WelcomePage
 from tests.widgets.drawn import distance, pixels
-from widgets import theme
-from widgets.dialogs.command_palette import CommandPalette
-from widgets.dialogs.export_dialog import ExportDialog
-from widgets.dialogs.fuzzy import score
-from widgets.dialogs.import_data import ImportChoice, ImportShown
-from widgets.dialogs.import_dialog import ImportDialog
-from widgets.dialogs.points_preview import PointsPreview
-from widgets.dialogs.shortcut_sheet import ShortcutSheet
-from widgets.gallery_dialogs import ENTRIES, FORMATS
-from widgets.panels.controls import ChoiceBox
-from widgets.panels.history import HistoryList
-from widgets.panels.message_bar import Message, MessageBar
-from widgets.panels.progress_strip import ProgressStrip
-from widgets.panels.stage_data import StageProgress
-from widgets.panels.welcome import Recent, WelcomePage
 
 POINTS = np.array([[0, 0, 0], [0.2, 0, 1.7], [-0.2, 0.1, 0.9], [np.nan] * 3])
 SHOWN = ImportShown(

@@ -10,19 +10,19 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
+from markerscope.widgets.gallery.plots import session_rows
+from markerscope.widgets.panels.hypotheses import HypothesesView
+from markerscope.widgets.panels.stage_panel import StagePanel
+from markerscope.widgets.plots.affinity import AffinityView
+from markerscope.widgets.plots.angle_data import AngleCurve, AnglePlot
+from markerscope.widgets.plots.convergence import ConvergenceView, EnergyCurve
+from markerscope.widgets.plots.curves import CurvesView
+from markerscope.widgets.plots.pair import PairPlot
+from markerscope.widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
+from markerscope.widgets.plots.timelines import Timelines
+from markerscope.widgets.tables.candidates import CandidateTable
+from markerscope.widgets.tables.markers import MarkerRows, MarkerTable
 from tests.widgets.drawn import pixels
-from widgets.gallery_plots import session_rows
-from widgets.panels.hypotheses import HypothesesView
-from widgets.panels.stage_panel import StagePanel
-from widgets.plots.affinity import AffinityView
-from widgets.plots.angle_data import AngleCurve, AnglePlot
-from widgets.plots.convergence import ConvergenceView, EnergyCurve
-from widgets.plots.curves import CurvesView
-from widgets.plots.pair import PairPlot
-from widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
-from widgets.plots.timelines import Timelines
-from widgets.tables.candidates import CandidateTable
-from widgets.tables.markers import MarkerRows, MarkerTable
 
 NONE, INK = np.zeros(0), np.array([0, 0, 255], np.uint8)
 
@@ -33,7 +33,7 @@ def poke(widget: QWidget) -> None:
     widget.show()
     QApplication.processEvents()
     for part in [widget, *widget.findChildren(QWidget)]:
-        if part.isVisibleTo(widget) and type(part).__module__.startswith("widgets.plots"):
+        if part.isVisibleTo(widget) and type(part).__module__.startswith("markerscope.widgets.plots"):
             QTest.mouseClick(part, Qt.MouseButton.LeftButton, pos=part.rect().center())
             QTest.mouseMove(part, part.rect().center())
             for key in (Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Plus):

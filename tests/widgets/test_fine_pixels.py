@@ -12,9 +12,9 @@ SCRIPT = """
 import sys, time
 import numpy as np
 from PySide6.QtWidgets import QApplication
-from widgets import theme
-from widgets.images import to_rgb
-from widgets.scene import Scene3D
+from markerscope.widgets import theme
+from markerscope.widgets.images import to_rgb
+from markerscope.widgets.scene import Scene3D
 
 app = QApplication([])
 theme.apply(app, "light", 1.0)
@@ -45,7 +45,7 @@ print("drawn", scene.devicePixelRatioF())
 
 
 def test_the_scene_with_two_pixels_a_point() -> None:
-    environment = os.environ | {"QT_SCALE_FACTOR": "2", "PYTHONPATH": str(ROOT)}
+    environment = os.environ | {"QT_SCALE_FACTOR": "2", "PYTHONPATH": os.environ["PYTHONPATH"]}
     environment |= {"QT_QPA_PLATFORM": "offscreen", "VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
     words = [sys.executable, "-c", SCRIPT]
     run = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=120)

@@ -19,8 +19,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from markerscope.widgets import theme
+from markerscope.widgets.gallery import dialogs as gallery_dialogs
+from markerscope.widgets.gallery import panels as gallery_panels
+from markerscope.widgets.gallery import plots as gallery_plots
+from markerscope.widgets.gallery import tables as gallery_tables
 from tests.widgets.drawn import distance, pixels
-from widgets import gallery_dialogs, gallery_panels, gallery_plots, gallery_tables, theme
 
 EXAMPLES = gallery_plots.EXAMPLES | gallery_tables.EXAMPLES | gallery_panels.EXAMPLES | gallery_dialogs.EXAMPLES
 

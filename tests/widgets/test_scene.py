@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QApplication
 
+from markerscope.widgets import palette, theme
+from markerscope.widgets.scene import ColourBar, Scene3D
 from tests.widgets.seen import BLUE, COLOURS, GREEN, RED, THREE, at, box, picture
-from widgets import palette, theme
-from widgets.scene import ColourBar, Scene3D
 
 
 @pytest.mark.parametrize("parallel", [False, True])

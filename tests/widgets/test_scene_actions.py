@@ -14,9 +14,9 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QImage, QKeyEvent
 from PySide6.QtWidgets import QApplication
 
+from markerscope.widgets.images import to_rgb
+from markerscope.widgets.scene import Scene3D
 from tests.widgets.seen import COLOURS, CONTROL, SHIFT, THREE, box, picture
-from widgets.images import to_rgb
-from widgets.scene import Scene3D
 
 
 def test_clicks_boxes_and_hovering_say_which_marker(scene: Scene3D, mouse: Callable[..., None]) -> None:
@@ -169,13 +169,16 @@ def test_a_turntable_goes_round_once_and_leaves_the_camera(scene: Scene3D) -> No
 def test_without_opengl_it_says_what_to_install(tmp_path: Path) -> None:
     code = (
         "from PySide6.QtWidgets import QApplication; import numpy as np; app = QApplication([])\n"
-        "from widgets.scene import Scene3D; s = Scene3D(); s.resize(400, 300)\n"
+        "from markerscope.widgets.scene import Scene3D; s = Scene3D(); s.resize(400, 300)\n"
         "s.set_markers(np.zeros((3, 3)), np.zeros((3, 3), np.uint8)); s.set_floor(0); s.view_from('fit'); s.show()\n"
         "app.processEvents(); s.save_png('a.png'); print(s.problem); s.orbit(1, 0); app.processEvents()"
     )
-    root = str(Path(__file__).parents[2])
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "VTK_DEFAULT_OPENGL_WINDOW")}
-    environment |= {"QT_QPA_PLATFORM": "offscreen", "LIBGL_DRIVERS_PATH": str(tmp_path), "PYTHONPATH": root}
+    environment |= {
+        "QT_QPA_PLATFORM": "offscreen",
+        "LIBGL_DRIVERS_PATH": str(tmp_path),
+        "PYTHONPATH": os.environ["PYTHONPATH"],
+    }
     environment |= {"GBM_BACKENDS_PATH": str(tmp_path)}
     run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
@@ -205,7 +208,16 @@ def test_scenes_that_were_closed_harm_none_that_follow(tmp_path: Path) -> None:
     """A marker mapper that VTK frees takes the buffers of the scene that draws, and the process ends: so in a child."""
     root = Path(__file__).parents[2]
     names = ["scene_clusters", "scene_ghosts", "scene_residuals"]
-    command = [sys.executable, "-m", "widgets.gallery", "--shots", str(tmp_path), "--theme", "dark", *names]
+    command = [
+        sys.executable,
+        "-m",
+        "markerscope.widgets.gallery.__main__",
+        "--shots",
+        str(tmp_path),
+        "--theme",
+        "dark",
+        *names,
+    ]
     run = subprocess.run(command, cwd=root, env={**os.environ}, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     for name in names:

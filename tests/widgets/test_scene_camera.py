@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from widgets.scene import PRESETS, Camera
-from widgets.scene.picking import nearest_point, nearest_segment, points_in_box
+from markerscope.widgets.scene import PRESETS, Camera
+from markerscope.widgets.scene.picking import nearest_point, nearest_segment, points_in_box
 
 angles = st.floats(-3.1, 3.1)
 cameras = st.builds(

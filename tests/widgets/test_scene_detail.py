@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QApplication
 
+from markerscope.widgets.images import to_rgb
+from markerscope.widgets.scene import Scene3D
+from markerscope.widgets.video import VideoView
 from tests.widgets.drawn import pixels
 from tests.widgets.seen import COLOURS, THREE, at, box, picture
-from widgets.images import to_rgb
-from widgets.scene import Scene3D
-from widgets.video import VideoView
 
 MIDDLE, RIM = np.array([240.0, 180.0]), np.array([240.0, 110.0])
 """px: on both boxes, and on the larger one alone."""

@@ -10,13 +10,13 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QCheckBox, QLabel, QPushButton, QWidget
 
+from markerscope.widgets import theme
+from markerscope.widgets.boxes import ChoiceBox, CountBox, NumberBox
+from markerscope.widgets.gallery.panels import SEGMENT, STAGES
+from markerscope.widgets.panels.fields import SettingsForm
+from markerscope.widgets.panels.stage_data import StageProgress, duration, left
+from markerscope.widgets.panels.stage_panel import StagePanel
 from tests.widgets.drawn import distance, pixels
-from widgets import theme
-from widgets.gallery_panels import SEGMENT, STAGES
-from widgets.panels.controls import ChoiceBox, CountBox, NumberBox
-from widgets.panels.fields import SettingsForm
-from widgets.panels.stage_data import StageProgress, duration, left
-from widgets.panels.stage_panel import StagePanel
 
 
 @pytest.fixture

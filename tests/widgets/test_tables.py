@@ -11,13 +11,13 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from markerscope.widgets import theme
+from markerscope.widgets.gallery.tables import candidate_rows, marker_rows
+from markerscope.widgets.tables.array_table import ArrayTable
+from markerscope.widgets.tables.candidates import CandidateTable, SearchStep
+from markerscope.widgets.tables.columns import Column, natural
+from markerscope.widgets.tables.markers import MarkerTable
 from tests.widgets.drawn import distance, pixels
-from widgets import theme
-from widgets.gallery_tables import candidate_rows, marker_rows
-from widgets.tables.array_table import ArrayTable
-from widgets.tables.candidates import CandidateTable, SearchStep
-from widgets.tables.columns import Column, natural
-from widgets.tables.markers import MarkerTable
 
 NAMES = ["M10", "M2", "M1", "M3"]
 SIZES = np.array([0.5, np.nan, 12.25, -3.0])

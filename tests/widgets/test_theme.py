@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent
 from PySide6.QtGui import QIcon, QImage, QPalette
 from PySide6.QtWidgets import QApplication, QWidget
 
-from widgets import icons, palette, theme
+from markerscope.widgets import icons, palette, theme
 
 
 def pixels(icon: QIcon, size: int = 32) -> np.ndarray:

@@ -13,14 +13,14 @@ from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolButton, QWidget
 
+from markerscope.widgets import palette, theme
+from markerscope.widgets.plots.curve_paint import shortened
+from markerscope.widgets.plots.decimate import Counts, envelope, shown_frames
+from markerscope.widgets.plots.ink import legible
+from markerscope.widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
+from markerscope.widgets.plots.scales import Scale, clock, log_ticks, number, ticks, time_ticks
+from markerscope.widgets.plots.timelines import Timelines
 from tests.widgets.drawn import pixels
-from widgets import palette, theme
-from widgets.plots.curve_paint import shortened
-from widgets.plots.decimate import Counts, envelope, shown_frames
-from widgets.plots.ink import legible
-from widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
-from widgets.plots.scales import Scale, clock, log_ticks, number, ticks, time_ticks
-from widgets.plots.timelines import Timelines
 
 TIME = np.arange(1000) / 100.0
 BLUE, ORANGE = np.array([0, 114, 178], np.uint8), np.array([230, 159, 0], np.uint8)

@@ -14,12 +14,12 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 
+from markerscope.widgets.images import to_rgb
+from markerscope.widgets.scene import Camera
+from markerscope.widgets.video import LAYERS, VideoView
+from markerscope.widgets.video.outline import Outline
+from markerscope.widgets.video.zoom import Zoom
 from tests.widgets.seen import BLUE, GREEN, RED, box
-from widgets.images import to_rgb
-from widgets.scene import Camera
-from widgets.video import LAYERS, VideoView
-from widgets.video.outline import Outline
-from widgets.video.zoom import Zoom
 
 FRAME = np.zeros((120, 200, 3), dtype=np.uint8)
 FRAME[:60, :100], FRAME[60:, :100], FRAME[:60, 100:], FRAME[60:, 100:] = (90, 0, 0), (0, 90, 0), (0, 0, 90), (60, 60, 0)

@@ -19,10 +19,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from widgets.dialogs.fuzzy import score
-from widgets.icons import icon
-from widgets.tables.model import Index
-from widgets.theme import colours, qcolour
+from markerscope.widgets.dialogs.fuzzy import score
+from markerscope.widgets.icons import icon
+from markerscope.widgets.tables.model import Index
+from markerscope.widgets.theme import colours, qcolour
 
 _ENTRY = int(Qt.ItemDataRole.UserRole)
 

@@ -20,8 +20,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from widgets.icons import icon
-from widgets.theme import colours
+from markerscope.widgets.icons import icon
+from markerscope.widgets.theme import colours
 
 
 @dataclass(frozen=True)

@@ -18,13 +18,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from widgets.dialogs.import_data import AXES, UNITS, ImportChoice, ImportShown
-from widgets.dialogs.points_preview import PointsPreview
-from widgets.icons import icon
-from widgets.panels.fields import SettingsForm
-from widgets.panels.stage_data import FieldSpec
-from widgets.plots.curves import BoxDelegate
-from widgets.plots.scales import number
+from markerscope.widgets.dialogs.import_data import AXES, UNITS, ImportChoice, ImportShown
+from markerscope.widgets.dialogs.points_preview import PointsPreview
+from markerscope.widgets.icons import icon
+from markerscope.widgets.panels.fields import SettingsForm
+from markerscope.widgets.panels.stage_data import FieldSpec
+from markerscope.widgets.plots.curves import BoxDelegate
+from markerscope.widgets.plots.scales import number
 
 _RARE = 0.05
 

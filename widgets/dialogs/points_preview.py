@@ -9,9 +9,9 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QFontMetricsF, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
-from widgets.plots.ink import colour, em, pen
-from widgets.plots.scales import nice_step, number
-from widgets.theme import colours
+from markerscope.widgets.plots.ink import colour, em, pen
+from markerscope.widgets.plots.scales import nice_step, number
+from markerscope.widgets.theme import colours
 
 
 class PointsPreview(QWidget):

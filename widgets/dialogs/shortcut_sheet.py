@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from widgets.theme import colours
+from markerscope.widgets.theme import colours
 
 
 class ShortcutSheet(QDialog):

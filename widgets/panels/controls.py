@@ -6,47 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QWheelEvent
-from PySide6.QtWidgets import QAbstractSpinBox, QCheckBox, QComboBox, QDoubleSpinBox, QLineEdit, QSpinBox, QWidget
+from PySide6.QtWidgets import QAbstractSpinBox, QCheckBox, QComboBox, QLineEdit, QWidget
 
-from widgets.panels.stage_data import FieldSpec
+from markerscope.widgets.boxes import ChoiceBox, CountBox, NumberBox
+from markerscope.widgets.panels.stage_data import FieldSpec
 
 _UNITS = {"deg": "°"}
-
-
-class _CalmWheel:
-    """Numbers do not change as the panel is scrolled over them."""
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Leave the wheel to the panel unless the number is being edited."""
-        if self.hasFocus():  # type: ignore[attr-defined]
-            super().wheelEvent(event)  # type: ignore[misc]
-        else:
-            event.ignore()
-
-
-class NumberBox(_CalmWheel, QDoubleSpinBox):
-    """A number without needless zeros, or a blank."""
-
-    blank = False
-
-    def textFromValue(self, value: float) -> str:
-        """Six digits at most."""
-        return "" if self.blank else f"{value:.6g}"
-
-
-class CountBox(_CalmWheel, QSpinBox):
-    """A whole number, or a blank."""
-
-    blank = False
-
-    def textFromValue(self, value: int) -> str:
-        """Without separators."""
-        return "" if self.blank else str(value)
-
-
-class ChoiceBox(_CalmWheel, QComboBox):
-    """One of several words."""
 
 
 def said(spec: FieldSpec, value: Any) -> str:

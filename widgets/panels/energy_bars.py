@@ -9,9 +9,9 @@ from PySide6.QtCore import QEvent, QRectF, QSize, Qt
 from PySide6.QtGui import QHelpEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
-from widgets.plots.ink import colour, em, pen
-from widgets.plots.scales import number
-from widgets.theme import colours
+from markerscope.widgets.plots.ink import colour, em, pen
+from markerscope.widgets.plots.scales import number
+from markerscope.widgets.theme import colours
 
 
 class EnergyBar(QWidget):

@@ -19,20 +19,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from widgets.icons import icon
-from widgets.panels.controls import (
-    CountBox,
-    NumberBox,
-    control_of,
-    fit,
-    number_box,
-    on_change,
-    read,
-    said,
-    suffix,
-    write,
-)
-from widgets.panels.stage_data import FieldSpec
+from markerscope.widgets.boxes import CountBox, NumberBox
+from markerscope.widgets.icons import icon
+from markerscope.widgets.panels.controls import control_of, fit, number_box, on_change, read, said, suffix, write
+from markerscope.widgets.panels.stage_data import FieldSpec
 
 
 class Editor(QWidget):

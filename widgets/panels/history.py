@@ -8,8 +8,8 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QFont, QKeyEvent
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
-from widgets.icons import icon
-from widgets.theme import colours, qcolour
+from markerscope.widgets.icons import icon
+from markerscope.widgets.theme import colours, qcolour
 
 
 class HistoryList(QListWidget):

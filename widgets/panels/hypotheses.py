@@ -19,11 +19,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from widgets.icons import icon
-from widgets.panels.energy_bars import EnergyBar, TermKey
-from widgets.plots.ink import colour, em, pen
-from widgets.plots.scales import HEADING, degrees, figure
-from widgets.theme import colours
+from markerscope.widgets.icons import icon
+from markerscope.widgets.panels.energy_bars import EnergyBar, TermKey
+from markerscope.widgets.plots.ink import colour, em, pen
+from markerscope.widgets.plots.scales import HEADING, degrees, figure
+from markerscope.widgets.theme import colours
 
 
 @dataclass(frozen=True)

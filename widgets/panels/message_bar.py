@@ -9,8 +9,8 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QFont, QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
-from widgets.icons import icon
-from widgets.theme import colours, qcolour
+from markerscope.widgets.icons import icon
+from markerscope.widgets.theme import colours, qcolour
 
 Level = Literal["error", "warning", "info", "good"]
 _MOST = 3

@@ -5,9 +5,9 @@ from __future__ import annotations
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QToolButton, QWidget
 
-from widgets.icons import icon
-from widgets.panels.bar import show_part
-from widgets.panels.stage_data import StageProgress, left
+from markerscope.widgets.icons import icon
+from markerscope.widgets.panels.bar import show_part
+from markerscope.widgets.panels.stage_data import StageProgress, left
 
 
 class ProgressStrip(QWidget):

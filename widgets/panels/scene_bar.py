@@ -9,8 +9,8 @@ from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QHBoxLayout, QLabel, QSlider, QToolButton, QWidget
 
-from widgets.icons import icon
-from widgets.panels.menu_button import menu_button
+from markerscope.widgets.icons import icon
+from markerscope.widgets.menu_button import menu_button
 
 
 @dataclass(frozen=True)

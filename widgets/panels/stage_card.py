@@ -19,11 +19,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from widgets.icons import icon
-from widgets.panels.bar import show_part
-from widgets.panels.fields import SettingsForm
-from widgets.panels.stage_data import MEANING, EarlierResult, StageData, StageProgress, duration, left
-from widgets.theme import colours
+from markerscope.widgets.icons import icon
+from markerscope.widgets.panels.bar import show_part
+from markerscope.widgets.panels.fields import SettingsForm
+from markerscope.widgets.panels.stage_data import MEANING, EarlierResult, StageData, StageProgress, duration, left
+from markerscope.widgets.theme import colours
 
 _WORDS = {"stale": "out of date"}
 """What a state is called where that is another word."""

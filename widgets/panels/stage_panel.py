@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from PySide6.QtCore import QEvent, QObject, QSize, Qt, Signal
 from PySide6.QtWidgets import QFrame, QScrollArea, QVBoxLayout, QWidget
 
-from widgets.panels.stage_card import StageCard
-from widgets.panels.stage_data import StageData, StageProgress
+from markerscope.widgets.panels.stage_card import StageCard
+from markerscope.widgets.panels.stage_data import StageData, StageProgress
 
 
 class StagePanel(QScrollArea):

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from PySide6.QtCore import QSignalBlocker, QSize, Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
-from widgets.icons import icon
-from widgets.plots.scales import clock
+from markerscope.widgets.icons import icon
+from markerscope.widgets.plots.scales import clock
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 

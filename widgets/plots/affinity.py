@@ -19,15 +19,15 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QMenu, QToolTip, QWidget
 
-from widgets import palette
-from widgets.plots import affinity_paint as paint
-from widgets.plots.affinity_below import Below
-from widgets.plots.affinity_menu import edit_menu
-from widgets.plots.affinity_paint import MM, Places
-from widgets.plots.dendrogram import Dendrogram
-from widgets.plots.ink import colour, em, pen, runs
-from widgets.plots.scales import Scale, number
-from widgets.theme import colours
+from markerscope.widgets import palette
+from markerscope.widgets.plots import affinity_paint as paint
+from markerscope.widgets.plots.affinity_below import Below
+from markerscope.widgets.plots.affinity_menu import edit_menu
+from markerscope.widgets.plots.affinity_paint import MM, Places
+from markerscope.widgets.plots.dendrogram import Dendrogram
+from markerscope.widgets.plots.ink import colour, em, pen, runs
+from markerscope.widgets.plots.scales import Scale, number
+from markerscope.widgets.theme import colours
 
 
 class AffinityView(QWidget):

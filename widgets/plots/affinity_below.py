@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from PySide6.QtCore import QPointF
 
-from widgets.plots.affinity_paint import MM, Places
-from widgets.plots.dendrogram import Dendrogram
-from widgets.plots.scales import Scale, number
+from markerscope.widgets.plots.affinity_paint import MM, Places
+from markerscope.widgets.plots.dendrogram import Dendrogram
+from markerscope.widgets.plots.scales import Scale, number
 
 _REACH = 7.0
 """px from the cut within which it is grabbed."""

@@ -8,8 +8,8 @@ import numpy as np
 from PySide6.QtGui import QIcon, QPixmap
 from PySide6.QtWidgets import QMenu, QWidget
 
-from widgets.icons import icon
-from widgets.plots.ink import colour
+from markerscope.widgets.icons import icon
+from markerscope.widgets.plots.ink import colour
 
 
 def edit_menu(

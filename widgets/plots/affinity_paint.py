@@ -8,11 +8,11 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QFontMetricsF, QImage, QPainter, QPolygonF
 
-from widgets import palette
-from widgets.plots.dendrogram import Dendrogram, blocks
-from widgets.plots.ink import colour, elided, image_of, legible, pen, y_axis
-from widgets.plots.scales import Scale, number
-from widgets.theme import colours
+from markerscope.widgets import palette
+from markerscope.widgets.plots.dendrogram import Dendrogram, blocks
+from markerscope.widgets.plots.ink import colour, elided, image_of, legible, pen, y_axis
+from markerscope.widgets.plots.scales import Scale, number
+from markerscope.widgets.theme import colours
 
 SCALE = "viridis"
 MM = 1e3

@@ -10,12 +10,12 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFontMetricsF, QHelpEvent, QMouseEvent, QPainter, QPaintEvent, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QToolTip, QWidget
 
-from widgets import palette
-from widgets.plots.curve_paint import draw_curve, frame_at
-from widgets.plots.ink import colour, elided, em, legible, pen, y_axis
-from widgets.plots.rows import Curve
-from widgets.plots.scales import Scale, clock, limits, number, time_ticks
-from widgets.theme import colours
+from markerscope.widgets import palette
+from markerscope.widgets.plots.curve_paint import draw_curve, frame_at
+from markerscope.widgets.plots.ink import colour, elided, em, legible, pen, y_axis
+from markerscope.widgets.plots.rows import Curve
+from markerscope.widgets.plots.scales import Scale, clock, limits, number, time_ticks
+from markerscope.widgets.theme import colours
 
 OUT_OF_DATE = "out of date"
 _JUMP_DEG = 120.0

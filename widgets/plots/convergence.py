@@ -11,9 +11,9 @@ from PySide6.QtCore import QSignalBlocker, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QIcon, QPixmap
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QSlider, QToolButton, QVBoxLayout, QWidget
 
-from widgets.icons import icon
-from widgets.plots.convergence_plot import ConvergencePlot, energy_text
-from widgets.plots.ink import colour
+from markerscope.widgets.icons import icon
+from markerscope.widgets.plots.convergence_plot import ConvergencePlot, energy_text
+from markerscope.widgets.plots.ink import colour
 
 _STEP_MS, _PLAY_STEPS = 40, 120
 """Playing takes some five seconds however many iterations there were."""

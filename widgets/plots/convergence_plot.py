@@ -10,10 +10,10 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFontMetricsF, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
-from widgets import palette
-from widgets.plots.ink import colour, em, legible, pen, polyline, y_axis
-from widgets.plots.scales import Scale, number
-from widgets.theme import colours
+from markerscope.widgets import palette
+from markerscope.widgets.plots.ink import colour, em, legible, pen, polyline, y_axis
+from markerscope.widgets.plots.scales import Scale, number
+from markerscope.widgets.theme import colours
 
 
 class ConvergencePlot(QWidget):

@@ -8,11 +8,11 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QFontMetricsF, QPainter
 
-from widgets.plots.decimate import envelope
-from widgets.plots.ink import colour, faded, legible, pen, polyline
-from widgets.plots.rows import Curve
-from widgets.plots.scales import Scale
-from widgets.theme import colours
+from markerscope.widgets.plots.decimate import envelope
+from markerscope.widgets.plots.ink import colour, faded, legible, pen, polyline
+from markerscope.widgets.plots.rows import Curve
+from markerscope.widgets.plots.scales import Scale
+from markerscope.widgets.theme import colours
 
 
 def frame_at(time: np.ndarray, at: float) -> int:

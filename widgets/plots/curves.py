@@ -25,11 +25,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from widgets.icons import icon
-from widgets.panels.controls import ChoiceBox
-from widgets.plots.angle_plots import AnglePlots
-from widgets.plots.ink import pen
-from widgets.theme import colours
+from markerscope.widgets.boxes import ChoiceBox
+from markerscope.widgets.icons import icon
+from markerscope.widgets.plots.angle_plots import AnglePlots
+from markerscope.widgets.plots.ink import pen
+from markerscope.widgets.theme import colours
 
 Index = QModelIndex | QPersistentModelIndex
 FIRST = ("hip", "knee", "ankle")
@@ -146,7 +146,7 @@ class CurvesView(QWidget):
         Parameters
         ----------
         time : (T,) s
-        plots : see :class:`widgets.plots.angle_data.AnglePlot`; references are drawn dashed
+        plots : see :class:`markerscope.widgets.plots.angle_data.AnglePlot`; references are drawn dashed
         convention, zero_pose : what the angles are, in words
         reference : what the dashed curves are of, in words
         missing : why something that is compared has no curves here, a sentence

@@ -10,9 +10,9 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
-from widgets import palette
-from widgets.plots.scales import Scale, number
-from widgets.theme import colours, qcolour
+from markerscope.widgets import palette
+from markerscope.widgets.plots.scales import Scale, number
+from markerscope.widgets.theme import colours, qcolour
 
 _CONTRAST = 3.0
 """What WCAG asks of lines and signs."""

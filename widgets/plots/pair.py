@@ -7,12 +7,12 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFontMetricsF, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
-from widgets import palette
-from widgets.plots.curve_paint import frame_at
-from widgets.plots.decimate import envelope
-from widgets.plots.ink import colour, elided, em, pen, polyline, y_axis
-from widgets.plots.scales import Scale, clock, limits, number, time_ticks
-from widgets.theme import colours
+from markerscope.widgets import palette
+from markerscope.widgets.plots.curve_paint import frame_at
+from markerscope.widgets.plots.decimate import envelope
+from markerscope.widgets.plots.ink import colour, elided, em, pen, polyline, y_axis
+from markerscope.widgets.plots.scales import Scale, clock, limits, number, time_ticks
+from markerscope.widgets.theme import colours
 
 
 class PairPlot(QWidget):

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from PySide6.QtCore import QRectF
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
-from widgets.panels.menu_button import menu_button
-from widgets.plots.row_painters import OffsetPainter, RowPainter, offset_text
+from markerscope.widgets.menu_button import menu_button
+from markerscope.widgets.plots.row_painters import OffsetPainter, RowPainter, offset_text
 
 _SAME_S = 5e-4
 

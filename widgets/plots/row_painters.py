@@ -8,13 +8,13 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QFontMetricsF, QPainter
 
-from widgets import palette
-from widgets.plots.curve_paint import curve_value, draw_curve, frame_at, legend
-from widgets.plots.decimate import Counts, presence_picture, shown_frames, strength
-from widgets.plots.ink import colour, elided, image_of, pen, runs, y_axis
-from widgets.plots.rows import CurveRow, OffsetRow, PresenceRow, Row, StateRow
-from widgets.plots.scales import Scale, clock, limits, number
-from widgets.theme import colours
+from markerscope.widgets import palette
+from markerscope.widgets.plots.curve_paint import curve_value, draw_curve, frame_at, legend
+from markerscope.widgets.plots.decimate import Counts, presence_picture, shown_frames, strength
+from markerscope.widgets.plots.ink import colour, elided, image_of, pen, runs, y_axis
+from markerscope.widgets.plots.rows import CurveRow, OffsetRow, PresenceRow, Row, StateRow
+from markerscope.widgets.plots.scales import Scale, clock, limits, number
+from markerscope.widgets.theme import colours
 
 _FILLED = 0.4
 """How strong the marker's own colour is where it was not measured but made up."""

@@ -9,13 +9,13 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFontMetricsF, QMouseEvent, QPainter, QPaintEvent, QPolygonF, QWheelEvent
 from PySide6.QtWidgets import QWidget
 
-from widgets import palette
-from widgets.plots.decimate import Counts, shown_frames
-from widgets.plots.ink import colour, em, image_of, pen
-from widgets.plots.rows import PresenceRow, Row
-from widgets.plots.scales import Scale, clock, time_ticks
-from widgets.plots.time_window import TimeWindow
-from widgets.theme import colours
+from markerscope.widgets import palette
+from markerscope.widgets.plots.decimate import Counts, shown_frames
+from markerscope.widgets.plots.ink import colour, em, image_of, pen
+from markerscope.widgets.plots.rows import PresenceRow, Row
+from markerscope.widgets.plots.scales import Scale, clock, time_ticks
+from markerscope.widgets.plots.time_window import TimeWindow
+from markerscope.widgets.theme import colours
 
 _REACH = 6.0
 """px from an end within which it is grabbed."""

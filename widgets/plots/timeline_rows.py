@@ -8,14 +8,14 @@ from PySide6.QtCore import QEvent, QPointF, QRect, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFontMetricsF, QHelpEvent, QMouseEvent, QPainter, QPaintEvent, QPixmap, QWheelEvent
 from PySide6.QtWidgets import QMenu, QToolTip, QWidget
 
-from widgets import palette
-from widgets.plots.ink import colour, elided, em, pen
-from widgets.plots.row_buttons import RowButtons
-from widgets.plots.row_painters import OffsetPainter, PresencePainter, RowPainter, painter_of
-from widgets.plots.rows import CurveRow, Row
-from widgets.plots.scales import Scale
-from widgets.plots.time_window import TimeWindow
-from widgets.theme import colours
+from markerscope.widgets import palette
+from markerscope.widgets.plots.ink import colour, elided, em, pen
+from markerscope.widgets.plots.row_buttons import RowButtons
+from markerscope.widgets.plots.row_painters import OffsetPainter, PresencePainter, RowPainter, painter_of
+from markerscope.widgets.plots.rows import CurveRow, Row
+from markerscope.widgets.plots.scales import Scale
+from markerscope.widgets.plots.time_window import TimeWindow
+from markerscope.widgets.theme import colours
 
 _GAP = 5.0
 """px between rows."""

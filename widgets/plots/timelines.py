@@ -8,10 +8,10 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QMenu, QScrollArea, QVBoxLayout, QWidget
 
-from widgets.plots.rows import Row
-from widgets.plots.time_window import TimeWindow
-from widgets.plots.timeline_header import TimelineHeader
-from widgets.plots.timeline_rows import TimelineRows
+from markerscope.widgets.plots.rows import Row
+from markerscope.widgets.plots.time_window import TimeWindow
+from markerscope.widgets.plots.timeline_header import TimelineHeader
+from markerscope.widgets.plots.timeline_rows import TimelineRows
 
 
 class Timelines(QWidget):

@@ -10,8 +10,8 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer, vtkRenderWindow
 
-from widgets.scene.camera import Camera
-from widgets.scene.gl import SOFTWARE
+from markerscope.widgets.scene.camera import Camera
+from markerscope.widgets.scene.gl import SOFTWARE
 
 # Position of each lamp about the head of who looks (right, up, backwards) and its strength: a key from the upper
 # left, a fill from the right, one from behind that lights the rim, and a little from straight ahead.

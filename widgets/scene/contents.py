@@ -7,11 +7,11 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from PySide6.QtWidgets import QWidget
 
-from widgets import theme
-from widgets.scene.legend import ColourBar, Legend, Rgb
-from widgets.scene.sheet import Sheet
-from widgets.scene.sight import Sight
-from widgets.scene.stage import Finer, Stage
+from markerscope.widgets import theme
+from markerscope.widgets.scene.legend import ColourBar, Legend, Rgb
+from markerscope.widgets.scene.sheet import Sheet
+from markerscope.widgets.scene.sight import Sight
+from markerscope.widgets.scene.stage import Finer, Stage
 
 
 class Contents(Sight):

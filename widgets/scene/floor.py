@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from widgets.scene.camera import Camera
+from markerscope.widgets.scene.camera import Camera
 
 _BELOW = 0.001  # m, under the soles
 _LEAST = 1.5  # m from the middle to each edge

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPointGaussianMapper, vtkPolyDataMapper
 
-from widgets.scene.arrays import Geometry
-from widgets.scene.normals import Normals
+from markerscope.widgets.scene.arrays import Geometry
+from markerscope.widgets.scene.normals import Normals
 
 MARKER_RADIUS = 0.008
 """m, a little over the usual 14 mm marker."""

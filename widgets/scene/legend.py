@@ -10,7 +10,9 @@ Rgb = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class ColourBar:
-    """A scale of colours from ``lo`` to ``hi`` in ``unit``; ``name`` is one of :data:`widgets.palette.SCALES`."""
+    """A scale of colours from ``lo`` to ``hi`` in ``unit``; ``name`` is one of
+    :data:`markerscope.widgets.palette.SCALES`.
+    """
 
     lo: float
     hi: float

@@ -5,9 +5,9 @@ from __future__ import annotations
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QFont, QFontMetricsF, QImage, QPainter, QPen, QPixmap
 
-from widgets import palette
-from widgets.scene.legend import ColourBar, Legend, Rgb
-from widgets.theme import Colours, qcolour
+from markerscope.widgets import palette
+from markerscope.widgets.scene.legend import ColourBar, Legend, Rgb
+from markerscope.widgets.theme import Colours, qcolour
 
 _PAD, _GAP, _MARGIN = 8.0, 6.0, 10.0
 _BAR = (150.0, 12.0)

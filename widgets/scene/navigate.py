@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QWheelEvent
 
 if TYPE_CHECKING:
-    from widgets.scene.view import Scene3D
+    from markerscope.widgets.scene.view import Scene3D
 
 _CLICK_PX = 4.0  # a press that moves less is a click
 _TURN_PER_PX = float(np.radians(0.45))

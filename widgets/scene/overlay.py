@@ -8,9 +8,9 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen, QPixmap
 
-from widgets import palette
-from widgets.scene.camera import Camera
-from widgets.theme import Colours, qcolour
+from markerscope.widgets import palette
+from markerscope.widgets.scene.camera import Camera
+from markerscope.widgets.theme import Colours, qcolour
 
 _KEPT_WORDS = 800
 

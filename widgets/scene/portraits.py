@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from PySide6.QtGui import QImage
 
-from widgets import theme
-from widgets.images import of_rgba
-from widgets.scene.camera import Camera
-from widgets.scene.stage import Stage
+from markerscope.widgets import theme
+from markerscope.widgets.images import of_rgba
+from markerscope.widgets.scene.camera import Camera
+from markerscope.widgets.scene.stage import Stage
 
 SIZE = 560, 420
 """px; about twice what is shown, so that edges are smooth there."""

@@ -6,14 +6,14 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QFont, QPainter
 
-from widgets import palette, theme
-from widgets.scene.camera import Camera
-from widgets.scene.layers import LEAST_RADIUS_PX, MARKER_RADIUS
-from widgets.scene.legend import Legend
-from widgets.scene.legend_paint import LegendPainter
-from widgets.scene.overlay import Places, Words, draw_axes, draw_band, draw_labels, draw_rings, draw_ticks
-from widgets.scene.stage import Stage
-from widgets.theme import qcolour
+from markerscope.widgets import palette, theme
+from markerscope.widgets.scene.camera import Camera
+from markerscope.widgets.scene.layers import LEAST_RADIUS_PX, MARKER_RADIUS
+from markerscope.widgets.scene.legend import Legend
+from markerscope.widgets.scene.legend_paint import LegendPainter
+from markerscope.widgets.scene.overlay import Places, Words, draw_axes, draw_band, draw_labels, draw_rings, draw_ticks
+from markerscope.widgets.scene.stage import Stage
+from markerscope.widgets.theme import qcolour
 
 _Point = tuple[float, float]
 

@@ -9,7 +9,7 @@ import numpy as np
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
-from widgets.scene.camera import Camera
+from markerscope.widgets.scene.camera import Camera
 
 
 class Sight(QWidget):
@@ -41,7 +41,7 @@ class Sight(QWidget):
         self._facing = float(np.arctan2(direction[1], direction[0]))
 
     def view_from(self, preset: str) -> None:
-        """One of :data:`widgets.scene.PRESETS`, or "fit" to see everything from where one looks."""
+        """One of :data:`markerscope.widgets.scene.PRESETS`, or "fit" to see everything from where one looks."""
         if preset == "fit":
             self.frame()
         else:

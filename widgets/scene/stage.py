@@ -7,11 +7,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from widgets.scene.camera import Camera
-from widgets.scene.canvas import JITTER, Canvas, average
-from widgets.scene.floor import Floor
-from widgets.scene.gl import gl_problem
-from widgets.scene.layers import (
+from markerscope.widgets.scene.camera import Camera
+from markerscope.widgets.scene.canvas import JITTER, Canvas, average
+from markerscope.widgets.scene.floor import Floor
+from markerscope.widgets.scene.gl import gl_problem
+from markerscope.widgets.scene.layers import (
     LEAST_RADIUS_PX,
     BoneLayer,
     Layer,
@@ -20,7 +20,7 @@ from widgets.scene.layers import (
     MeshLayer,
     trail_lines,
 )
-from widgets.theme import Colours
+from markerscope.widgets.theme import Colours
 
 _Kind = TypeVar("_Kind", bound=Layer)
 Finer = Callable[[], tuple[np.ndarray, np.ndarray] | tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -79,7 +79,7 @@ class Stage:
         self._draw_floor()
 
     def set_markers(self, positions: np.ndarray, colours: np.ndarray, sizes: np.ndarray | None) -> None:
-        """See :meth:`widgets.scene.Scene3D.set_markers`."""
+        """See :meth:`markerscope.widgets.scene.Scene3D.set_markers`."""
         self.markers = np.array(positions, dtype=float).reshape(-1, 3)
         self.colours = np.broadcast_to(np.asarray(colours, dtype=np.uint8), (len(self.markers), 3)).copy()
         self._markers.set(self.markers, self.colours, sizes)

@@ -13,13 +13,13 @@ from PySide6.QtCore import QEvent, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from widgets import theme
-from widgets.guard import PaintGuard
-from widgets.images import draw_focus, of_rgba, save, to_rgb
-from widgets.scene.contents import Contents
-from widgets.scene.navigate import HELP, Navigator
-from widgets.scene.picking import nearest_point, nearest_segment, points_in_box
-from widgets.scene.portraits import Portraits
+from markerscope.widgets import theme
+from markerscope.widgets.guard import PaintGuard
+from markerscope.widgets.images import draw_focus, of_rgba, save, to_rgb
+from markerscope.widgets.scene.contents import Contents
+from markerscope.widgets.scene.navigate import HELP, Navigator
+from markerscope.widgets.scene.picking import nearest_point, nearest_segment, points_in_box
+from markerscope.widgets.scene.portraits import Portraits
 
 REST_MS = 140
 """How long nothing must change before skins are shown finer and edges are smoothed, where that costs time."""
@@ -227,7 +227,7 @@ class Scene3D(Contents):
         event.accept()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Keys of :data:`widgets.scene.navigate.HELP`; others go on to the window."""
+        """Keys of :data:`markerscope.widgets.scene.navigate.HELP`; others go on to the window."""
         if not self._navigator.key(event):
             super().keyPressEvent(event)
 

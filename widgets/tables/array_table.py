@@ -21,10 +21,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from widgets.icons import icon
-from widgets.tables.columns import Column
-from widgets.tables.model import BAR, SWATCH, ArrayModel, Index, SortFilter
-from widgets.theme import colours, qcolour
+from markerscope.widgets.icons import icon
+from markerscope.widgets.tables.columns import Column
+from markerscope.widgets.tables.model import BAR, SWATCH, ArrayModel, Index, SortFilter
+from markerscope.widgets.theme import colours, qcolour
 
 
 class BarDelegate(QStyledItemDelegate):

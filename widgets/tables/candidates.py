@@ -18,10 +18,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from widgets.icons import icon
-from widgets.plots.scales import HEADING, degrees, figure
-from widgets.tables.array_table import ArrayTable
-from widgets.tables.columns import Column
+from markerscope.widgets.icons import icon
+from markerscope.widgets.plots.scales import HEADING, degrees, figure
+from markerscope.widgets.tables.array_table import ArrayTable
+from markerscope.widgets.tables.columns import Column
 
 MARGIN = "Score over that of the best: near 1 they tie. None where the two were not scored on the same frames"
 

@@ -10,9 +10,9 @@ import numpy as np
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from widgets.plots.scales import clock
-from widgets.tables.array_table import ArrayTable
-from widgets.tables.columns import Column
+from markerscope.widgets.plots.scales import clock
+from markerscope.widgets.tables.array_table import ArrayTable
+from markerscope.widgets.tables.columns import Column
 
 
 @dataclass(frozen=True, eq=False)

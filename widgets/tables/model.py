@@ -8,9 +8,9 @@ from typing import Any
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, QSortFilterProxyModel, Qt
 from PySide6.QtGui import QFont
 
-from widgets.icons import icon
-from widgets.plots.ink import colour
-from widgets.tables.columns import Column, absent, natural
+from markerscope.widgets.icons import icon
+from markerscope.widgets.plots.ink import colour
+from markerscope.widgets.tables.columns import Column, absent, natural
 
 Index = QModelIndex | QPersistentModelIndex
 BAR = int(Qt.ItemDataRole.UserRole) + 1

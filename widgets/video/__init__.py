@@ -1,5 +1,5 @@
 """The video."""
 
-from widgets.video.view import LAYERS, VideoView
+from markerscope.widgets.video.view import LAYERS, VideoView
 
 __all__ = ["LAYERS", "VideoView"]

@@ -19,12 +19,12 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from widgets import palette, theme
-from widgets.guard import PaintGuard
-from widgets.images import draw_focus, of_rgb, save
-from widgets.video.outline import Outline
-from widgets.video.paint import draw_landmarks, draw_lines, draw_markers, draw_text, stroke
-from widgets.video.zoom import Zoom
+from markerscope.widgets import palette, theme
+from markerscope.widgets.guard import PaintGuard
+from markerscope.widgets.images import draw_focus, of_rgb, save
+from markerscope.widgets.video.outline import Outline
+from markerscope.widgets.video.paint import draw_landmarks, draw_lines, draw_markers, draw_text, stroke
+from markerscope.widgets.video.zoom import Zoom
 
 LAYERS = ("picture", "landmarks", "markers", "body", "skeleton")
 _REACH = 10.0  # px of the screen

@@ -1,5 +1,5 @@
 """Monocular reconstructions of other programs as pose priors."""
 
-from solver.io.priors.load import load_prior
+from markerscope.solver.io.priors.load import load_prior
 
 __all__ = ["load_prior"]

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from solver.errors import InputError
-from solver.io.priors.fragments import Piece, joined, one_person
-from solver.io.priors.track import Track, numbers, rotations_from_matrices, rotations_from_vectors
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io.priors.fragments import Piece, joined, one_person
+from markerscope.solver.io.priors.track import Track, numbers, rotations_from_matrices, rotations_from_vectors
 
 _Y_UP = np.diag([1.0, -1, -1])
 """Turns a y-up world to a level camera's axes (x right, y down, z away)."""

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from solver.rotations import log_so3
+from markerscope.solver.core.rotations import log_so3
 
 K = TypeVar("K", bound=Hashable)
 """A track number, as the program that tracked writes it."""

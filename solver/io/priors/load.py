@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from solver.errors import InputError
-from solver.io.priors.formats import read_amass, read_gvhmr, read_phalp, read_tram, read_wham
-from solver.io.priors.track import Track, complete
-from solver.io.safe_pickle import load_untrusted
-from solver.prior import PosePrior
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.io.priors.formats import read_amass, read_gvhmr, read_phalp, read_tram, read_wham
+from markerscope.solver.io.priors.track import Track, complete
+from markerscope.solver.safe_pickle import load_untrusted
 
 Reader = Callable[[dict[Any, Any], str], Track]
 

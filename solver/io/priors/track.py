@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from solver.body.skeleton import JOINTS
-from solver.errors import InputError
-from solver.io.timeline import in_seconds
-from solver.prior import PosePrior
-from solver.prior_fill import fill_lost
-from solver.rotations import exp_so3
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.core.prior_fill import fill_lost
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import JOINTS
+from markerscope.solver.io.timeline import in_seconds
 
 _MOST_FRAMES = 2_000_000
 _DEFAULT_RATE = 30.0

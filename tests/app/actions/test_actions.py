@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.actions import ACTIONS, Actions
-from app.actions.session_actions import may_close, open_path
-from app.cli_commands import DEMO_MARKERS, DEMO_VIDEO
-from app.models import edits
-from app.models.home import Home
-from app.models.results import Ref
-from app.models.stages import states_of
-from app.models.workbench import Said, Workbench
-from solver.io import load_markers
-from solver.pipeline.session import Session, session_folder
+from markerscope.app.actions import ACTIONS, Actions
+from markerscope.app.actions.session_actions import may_close, open_path
+from markerscope.app.models import edits
+from markerscope.app.models.demo import DEMO_MARKERS, DEMO_VIDEO
+from markerscope.app.models.home import Home
+from markerscope.app.models.results import Ref
+from markerscope.app.models.stages import states_of
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.solver.io import load_markers
+from markerscope.solver.pipeline.session import Session, session_folder
 
 
 class Answers:

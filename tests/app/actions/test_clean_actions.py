@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.actions import Actions
-from app.models.workbench import Said, Workbench
-from solver.clean.clean import Cut
-from solver.clean.swaps import Proposal
+from markerscope.app.actions import Actions
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.solver.cleaning.clean import Cut
+from markerscope.solver.cleaning.swaps import Proposal
 from tests.app.actions.test_actions import Answers, actions, asks, bench, said, solved
 
 __all__ = ["Answers", "actions", "asks", "bench", "said", "solved"]  # fixtures

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.models.clock import SPEEDS, Clock, Timing
+from markerscope.app.models.clock import SPEEDS, Clock, Timing
 
 VIDEO = np.arange(300) / 30
 TIMING = Timing(first=2.0, rate=100.0, frames=301, video=VIDEO, offset=0.37)

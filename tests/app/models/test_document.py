@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.models import edits
-from app.models.document import Document
-from app.models.history import History, Step
-from app.models.home import Home
-from app.models.journal import JOURNAL, VIEW, read_journal
-from solver.errors import InputError
-from solver.pipeline.session import FILE_NAME, Session, load_session, save_session
-from solver.pipeline.store import Store
+from markerscope.app.models import edits
+from markerscope.app.models.document import Document
+from markerscope.app.models.history import History, Step
+from markerscope.app.models.home import Home
+from markerscope.app.models.journal import JOURNAL, VIEW, read_journal
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline.session import FILE_NAME, Session, load_session, save_session
+from markerscope.solver.pipeline.store import Store
 
 
 @pytest.fixture

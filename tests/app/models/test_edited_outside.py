@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from app.actions import ACTIONS, Actions
-from app.models.document import Document
-from app.models.workbench import Said, Workbench
-from solver.pipeline.session import load_session
-from solver.pipeline.session_file import FILE_NAME, EditedOutside
+from markerscope.app.actions import ACTIONS, Actions
+from markerscope.app.models.document import Document
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.solver.pipeline.session import load_session
+from markerscope.solver.pipeline.session_file import FILE_NAME, EditedOutside
 from tests.app.actions.test_actions import Answers
 from tests.app.models.test_document import crash, document, home, markers, offset, saved
 

@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import settings as tried
 from hypothesis import strategies as st
 
-from app.models import clean_edits, edits, group_edits
-from solver.clean.swaps import Proposal
-from solver.errors import InputError
-from solver.markers import Markers
-from solver.pipeline.methods import graph_of
-from solver.pipeline.session import Session, load_session, save_session
-from solver.segment import Segmentation, regroup, segment
+from markerscope.app.models import clean_edits, edits, group_edits
+from markerscope.solver.cleaning.swaps import Proposal
+from markerscope.solver.clustering.segment import Segmentation, regroup, segment
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.pipeline.methods import graph_of
+from markerscope.solver.pipeline.session import Session, load_session, save_session
 
 EMPTY = Session(Path("/nowhere"))
 LABELS = tuple("abcdefgh")

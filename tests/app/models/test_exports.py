@@ -9,18 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.models import edits
-from app.models.document import Document
-from app.models.exports import export, export_angles, formats, why_not, write_pictures, write_video
-from app.models.home import Home
-from app.models.stages import StageBoard
-from solver.errors import InputError
-from solver.io import load_markers
-from solver.outputs import FILES, FORMATS, SOMETIMES, STANDARD
-from solver.pipeline.digest import file_digest
-from solver.pipeline.session import Session
-from solver.report_data import Picture
-from solver.video.frames import index_video
+from markerscope.app.models import edits
+from markerscope.app.models.document import Document
+from markerscope.app.models.exports import export, export_angles, formats, why_not, write_pictures, write_video
+from markerscope.app.models.home import Home
+from markerscope.app.models.stages import StageBoard
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.io import load_markers
+from markerscope.solver.pipeline.digest import file_digest
+from markerscope.solver.pipeline.session import Session
+from markerscope.solver.report.outputs import FILES, FORMATS, SOMETIMES, STANDARD
+from markerscope.solver.report.report_data import Picture
+from markerscope.solver.video.frames import index_video
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def test_where_one_file_cannot_be_made_none_is(board: StageBoard, tmp_path: Path
     def refuse(*args: object) -> None:
         raise InputError("the disk is full")
 
-    monkeypatch.setattr("solver.io.export_trc.write_trc", refuse)
+    monkeypatch.setattr("markerscope.solver.io.export_trc.write_trc", refuse)
     (tmp_path / "angles.mot").write_text("mine")
     with pytest.raises(InputError, match="the disk is full"):
         export(board, tmp_path, ["mot", "trc"])
@@ -105,7 +105,7 @@ def test_where_a_picture_cannot_be_written_no_file_is(board: StageBoard, tmp_pat
     def refuse(*args: object) -> None:
         raise InputError("the disk is full")
 
-    monkeypatch.setattr("app.models.exports.write_bytes_atomic", refuse)
+    monkeypatch.setattr("markerscope.app.models.exports.write_bytes_atomic", refuse)
     with pytest.raises(InputError, match="the disk is full"):
         export(board, tmp_path / "out", ["mot", "pictures"], [Picture("Front view", b"1")])
     assert not (tmp_path / "out").exists()

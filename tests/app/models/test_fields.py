@@ -7,13 +7,13 @@ from typing import get_args, get_origin, get_type_hints
 
 import pytest
 
-from app.models.fields import descriptions, setting_of, settings_of, title
-from app.models.ranges import RANGES
-from solver.pipeline.inputs import MarkerSettings, SyncSettings
-from solver.pipeline.methods import GRAPHS
-from solver.pipeline.stages_paper import PaperSegmentSettings
-from solver.segment import SegmentSettings
-from solver.solve.settings import FitSettings
+from markerscope.app.models.fields import descriptions, setting_of, settings_of, title
+from markerscope.app.models.ranges import RANGES
+from markerscope.solver.clustering.segment import SegmentSettings
+from markerscope.solver.fit.settings import FitSettings
+from markerscope.solver.pipeline.inputs import MarkerSettings, SyncSettings
+from markerscope.solver.pipeline.methods import GRAPHS
+from markerscope.solver.pipeline.stages_paper import PaperSegmentSettings
 
 ALL = [setting for graph in GRAPHS.values() for stage in graph for setting in settings_of(stage.name, stage.settings())]
 

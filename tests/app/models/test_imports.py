@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from app.cli_commands import DEMO_MARKERS
-from app.models.document import Document
-from app.models.home import Home
-from app.models.imports import new_session
-from solver.pipeline.inputs import MarkerSettings
-from solver.pipeline.methods import graph_of
+from markerscope.app.models.demo import DEMO_MARKERS
+from markerscope.app.models.document import Document
+from markerscope.app.models.home import Home
+from markerscope.app.models.imports import new_session
+from markerscope.solver.pipeline.inputs import MarkerSettings
+from markerscope.solver.pipeline.methods import graph_of
 
 
 def test_choices_become_settings_and_unwanted_points_an_edit(tmp_path: Path) -> None:

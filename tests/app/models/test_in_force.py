@@ -18,14 +18,14 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from app.models import edits
-from app.models.document import Document
-from app.models.history import History, Step
-from app.models.home import Home
-from app.models.results import Ref
-from app.models.stages import StageBoard
-from solver.pipeline.run import keys_of
-from solver.pipeline.session import InputFile, Session, save_session
+from markerscope.app.models import edits
+from markerscope.app.models.document import Document
+from markerscope.app.models.history import History, Step
+from markerscope.app.models.home import Home
+from markerscope.app.models.results import Ref
+from markerscope.app.models.stages import StageBoard
+from markerscope.solver.pipeline.run import keys_of
+from markerscope.solver.pipeline.session import InputFile, Session, save_session
 
 
 @dataclass

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from app.models import edits
-from app.models.document import Document
-from app.models.home import Home
-from app.models.jobs import Runner, Running
-from app.models.results import Ref
-from app.models.stages import Failure, StageBoard, states_of
-from solver.errors import InputError
-from solver.pipeline.session import Session, save_session
-from solver.pipeline.stage import Event
-from solver.pipeline.worker import Progressed
-from solver.progress import Found
+from markerscope.app.models import edits
+from markerscope.app.models.document import Document
+from markerscope.app.models.home import Home
+from markerscope.app.models.jobs import Runner, Running
+from markerscope.app.models.results import Ref
+from markerscope.app.models.stages import Failure, StageBoard, states_of
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.progress import Found
+from markerscope.solver.pipeline.session import Session, save_session
+from markerscope.solver.pipeline.stage import Event
+from markerscope.solver.pipeline.worker import Progressed
 
 
 @pytest.fixture
@@ -134,7 +134,7 @@ def test_time_left_goes_by_past_runs_and_then_by_this_one(document: Document, mo
     now = [0.0]
     runner = Runner(StageBoard(document), clock=lambda: now[0])
     job = Played()
-    monkeypatch.setattr("app.models.jobs.Job", lambda *args, **kwargs: job)
+    monkeypatch.setattr("markerscope.app.models.jobs.Job", lambda *args, **kwargs: job)
     document.apply(edits.set_value(document.session, "fit", "video_share", 0.5))
     runner.run(["fit", "angles"])
     board = runner.board

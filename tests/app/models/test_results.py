@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.models.results import Ref, Results, Unread
-from solver.pipeline.methods import GRAPHS, result_type
-from solver.pipeline.run import keys_of
-from solver.pipeline.session import Session
-from solver.pipeline.store import Absent, Store
-from solver.solve.paper.results import PaperLocalization
-from solver.solve.results import Localization
-from solver.sync import Sync
+from markerscope.app.models.results import Ref, Results, Unread
+from markerscope.solver.fit.published.results import PaperLocalization
+from markerscope.solver.fit.results import Localization
+from markerscope.solver.pipeline.methods import GRAPHS, result_type
+from markerscope.solver.pipeline.run import keys_of
+from markerscope.solver.pipeline.session import Session
+from markerscope.solver.pipeline.store import Absent, Store
+from markerscope.solver.sync.offset import Sync
 
 
 def a_sync(offset: float) -> Sync:

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from app.models.selection import Selection
+from markerscope.app.models.selection import Selection
 
 CLUSTERS = np.array([0, 0, 1, 1, 1, -1])
 BONES = np.array([4, 4, 4, 7, 7, -1])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.models.signal import Signal
+from markerscope.app.models.signal import Signal
 
 
 def test_listeners_are_told_in_order_and_once() -> None:

@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.models import edits, group_edits
-from app.models.document import Document
-from app.models.home import Home
-from app.models.results import Ref
-from app.models.stages import Failure, StageBoard, states_of
-from solver.errors import InputError
-from solver.pipeline.inputs import SyncSettings
-from solver.pipeline.run import run_session
-from solver.pipeline.session import InputFile, Session, save_session
-from solver.segment import segment
-from solver.sync import Sync
+from markerscope.app.models import edits, group_edits
+from markerscope.app.models.document import Document
+from markerscope.app.models.home import Home
+from markerscope.app.models.results import Ref
+from markerscope.app.models.stages import Failure, StageBoard, states_of
+from markerscope.solver.clustering.segment import segment
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline.inputs import SyncSettings
+from markerscope.solver.pipeline.run import run_session
+from markerscope.solver.pipeline.session import InputFile, Session, save_session
+from markerscope.solver.sync.offset import Sync
 
 FITTED = {"localize", "orient", "fit", "angles", "surface", "check"}
 
@@ -84,7 +84,7 @@ def test_an_input_that_changed_makes_stale_what_stands_on_it(
 def test_an_input_that_has_gone_leaves_its_results_to_be_looked_at(session: Session, tmp_path: Path) -> None:
     copy = tmp_path / "session.c3d"
     shutil.copy(session.inputs["marker_file"].path, copy)
-    from solver.pipeline.digest import file_digest
+    from markerscope.solver.pipeline.digest import file_digest
 
     inputs = {**session.inputs, "marker_file": InputFile(copy, file_digest(copy))}
     save_session(replace(session, inputs=inputs))

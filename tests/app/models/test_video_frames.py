@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.models.frames import VideoFrames
-from solver.video.frames import index_video, read_near
+from markerscope.app.models.frames import VideoFrames
+from markerscope.solver.video.frames import index_video, read_near
 from tests.video.test_frames import number, write
 
 STAMPS = np.cumsum([0, *([33, 34, 33, 66] * 40)]).tolist()
@@ -63,7 +63,7 @@ def test_a_frame_can_be_had_before_all_are_decoded(video: Path, i: int) -> None:
 
 
 def test_what_is_asked_for_early_arrives(video: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import solver.video.frames as source
+    import markerscope.solver.video.frames as source
 
     read, go = source.read_frames, []
 

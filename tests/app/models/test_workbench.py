@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli_commands import DEMO_MARKERS, DEMO_VIDEO
-from app.models import edits, group_edits
-from app.models.display import Display
-from app.models.home import Home
-from app.models.workbench import Said, Workbench
-from solver.errors import InputError
-from solver.pipeline.session import Session
+from markerscope.app.models import edits, group_edits
+from markerscope.app.models.demo import DEMO_MARKERS, DEMO_VIDEO
+from markerscope.app.models.display import Display
+from markerscope.app.models.home import Home
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline.session import Session
 
 
 @pytest.fixture

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from solver.body.bones import with_bone_lengths
-from solver.body.model import Body
-from solver.markers import Markers
-from solver.rotations import exp_so3
-from solver.solve.results import CameraResult, FittedMotion
-from solver.sync import Sync
+from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.fit.results import FittedMotion
+from markerscope.solver.sync.offset import Sync
 
 FRAMES, COUNT, RATE, FIRST = 60, 14, 50.0, 0.4
 

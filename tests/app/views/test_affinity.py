@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.views.affinity import affinity_picture, cut_for, pair_distance, recut
-from solver.markers import Markers
-from solver.segment import SegmentSettings, segment
+from markerscope.app.views.affinity import affinity_picture, cut_for, pair_distance, recut
+from markerscope.solver.clustering.segment import SegmentSettings, segment
+from markerscope.solver.core.markers import Markers
 
 COUNT = 12
 

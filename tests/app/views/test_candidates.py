@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.views import bodies
-from app.views.candidates import FATES, CandidateTable, bone_names, candidate_table, coverage, covered_by
-from app.views.convergence import of_orientation, of_paper
-from app.views.hypotheses import hypotheses_picture
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, subtrees
-from solver.solve.doubts.doubt import Doubt
-from solver.solve.doubts.rules import Verdict
-from solver.solve.paper.results import PaperLocalization
-from solver.solve.results import Localization, Orientation
+from markerscope.app.views import bodies
+from markerscope.app.views.candidates import FATES, CandidateTable, bone_names, candidate_table, coverage, covered_by
+from markerscope.app.views.convergence import of_orientation, of_paper
+from markerscope.app.views.hypotheses import hypotheses_picture
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.skeleton import INDEX, subtrees
+from markerscope.solver.fit.doubts.doubt import Doubt
+from markerscope.solver.fit.doubts.rules import Verdict
+from markerscope.solver.fit.published.results import PaperLocalization
+from markerscope.solver.fit.results import Localization, Orientation
 
 
 def rows_of(table: CandidateTable, step: str) -> list[int]:

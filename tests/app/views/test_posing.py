@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from app.views.bodies import BodyTrack, keyframes_of, of_candidate, of_hypothesis, of_iteration, of_motion
-from app.views.posing import BONE_EDGES, Pose, bones_of, mesh_of, pose_at
-from solver.body.bone_meshes import bone_meshes
-from solver.body.model import Body
-from solver.body.skeleton import INDEX, JOINTS
-from solver.prior import PosePrior
-from solver.rotations import exp_so3, log_so3
-from solver.solve.paper.results import PaperLocalization, Trace
-from solver.solve.results import Candidate, Localization
+from markerscope.app.views.bodies import BodyTrack, keyframes_of, of_candidate, of_hypothesis, of_iteration, of_motion
+from markerscope.app.views.posing import BONE_EDGES, Pose, bones_of, mesh_of, pose_at
+from markerscope.solver.body.bone_meshes import bone_meshes
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.core.rotations import exp_so3, log_so3
+from markerscope.solver.core.skeleton import INDEX, JOINTS
+from markerscope.solver.fit.published.results import PaperLocalization, Trace
+from markerscope.solver.fit.results import Candidate, Localization
 from tests.app.views.conftest import Made, make
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.views.preview import preview_of
-from solver.errors import InputError
-from solver.io import load_markers
-from solver.io.export_trc import write_trc
-from solver.io.markers_in import read_raw
-from solver.io.raw import RawMarkers
-from solver.markers import Markers
+from markerscope.app.views.preview import preview_of
+from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.io import load_markers
+from markerscope.solver.io.export_trc import write_trc
+from markerscope.solver.io.markers_in import read_raw
+from markerscope.solver.io.raw import RawMarkers
 
 
 @pytest.fixture

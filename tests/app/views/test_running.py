@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.views import bodies
-from app.views.convergence import of_orientation
-from app.views.running import candidates_so_far, curves_so_far
-from solver.body.model import Body
-from solver.pipeline.stages import GRAPH, SOURCES
-from solver.progress import Found
-from solver.rotations import exp_so3
-from solver.solve.results import Orientation
-from solver.solve.settings import OrientSettings
+from markerscope.app.views import bodies
+from markerscope.app.views.convergence import of_orientation
+from markerscope.app.views.running import candidates_so_far, curves_so_far
+from markerscope.solver.body.model import Body
+from markerscope.solver.core.progress import Found
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.fit.results import Orientation
+from markerscope.solver.fit.settings import OrientSettings
+from markerscope.solver.pipeline.stages import GRAPH, SOURCES
 
 
 class Listener:

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.views.bodies import of_motion
-from app.views.colours import by_bone, by_cluster, by_residual, by_selection, by_state
-from app.views.scene import extent, markers_at, middle, misses, outline, ties, trails
-from app.views.tracks import FILLED, LOST, MEASURED, OUTLIER, pooled, tracks_of
-from solver.clean.clean import Cut
-from solver.markers import Markers
-from solver.segment import segment
+from markerscope.app.views.bodies import of_motion
+from markerscope.app.views.colours import by_bone, by_cluster, by_residual, by_selection, by_state
+from markerscope.app.views.scene import extent, markers_at, middle, misses, outline, ties, trails
+from markerscope.app.views.tracks import FILLED, LOST, MEASURED, OUTLIER, pooled, tracks_of
+from markerscope.solver.cleaning.clean import Cut
+from markerscope.solver.clustering.segment import segment
+from markerscope.solver.core.markers import Markers
+from markerscope.widgets import palette
 from tests.app.views.conftest import Made
-from widgets import palette
 
 
 def test_states_tell_measured_filled_taken_out_and_lost() -> None:

@@ -13,13 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from app.views.angles import angles_picture, bones_of, joint_of, title_of
-from app.views.markers import gap_lengths, marker_table
-from app.views.tracks import MEASURED, tracks_of
-from solver.angles import AngleSettings, Convention, JointAngles, conventions, evidence, joint_angles
-from solver.body.skeleton import JOINTS
-from solver.segment import segment
-from solver.solve.doubts.rules import Verdict
+from markerscope.app.views.angles import angles_picture, bones_of, joint_of, title_of
+from markerscope.app.views.markers import gap_lengths, marker_table
+from markerscope.app.views.tracks import MEASURED, tracks_of
+from markerscope.solver.angles.angles import AngleSettings, Convention, JointAngles, conventions, evidence, joint_angles
+from markerscope.solver.clustering.segment import segment
+from markerscope.solver.core.skeleton import JOINTS
+from markerscope.solver.fit.doubts.rules import Verdict
 from tests.app.views.conftest import Made
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.views.clocks import on_clock, over_markers, thinned
-from app.views.timelines import (
+from markerscope.app.views.clocks import on_clock, over_markers, thinned
+from markerscope.app.views.timelines import (
     TRACKED,
     UNSEEN,
     marker_motion,
@@ -20,12 +20,12 @@ from app.views.timelines import (
     video_motion,
     video_row,
 )
-from app.views.tracks import tracks_of
-from solver.clean.clean import Cut
-from solver.markers import Markers
-from solver.prior import PosePrior
-from solver.sync import Sync
-from solver.video.landmarks import Landmarks
+from markerscope.app.views.tracks import tracks_of
+from markerscope.solver.cleaning.clean import Cut
+from markerscope.solver.core.landmarks import Landmarks
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.prior import PosePrior
+from markerscope.solver.sync.offset import Sync
 from tests.app.views.conftest import Made
 
 

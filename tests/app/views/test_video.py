@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from app.views.bodies import of_motion
-from app.views.tracks import tracks_of
-from app.views.video import LANDMARK_EDGES, landmarks_at, projected, projection_at
-from solver.solve.results import CameraResult
-from solver.sync import Sync
-from solver.video.landmarks import LANDMARKS, Landmarks
+from markerscope.app.views.bodies import of_motion
+from markerscope.app.views.tracks import tracks_of
+from markerscope.app.views.video import LANDMARK_EDGES, landmarks_at, projected, projection_at
+from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.core.landmarks import LANDMARKS, Landmarks
+from markerscope.solver.sync.offset import Sync
 from tests.app.views.conftest import Made
 
 

@@ -11,13 +11,13 @@ import pytest
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
-from app.cli_commands import DEMO_VIDEO
-from app.models.home import Home
-from app.models.imports import new_session
-from app.models.workbench import Said, Workbench
-from app.window.main import MainWindow
-from app.window.showing import Showing
-from solver.pipeline.session import Session
+from markerscope.app.models.demo import DEMO_VIDEO
+from markerscope.app.models.home import Home
+from markerscope.app.models.imports import new_session
+from markerscope.app.models.workbench import Said, Workbench
+from markerscope.app.window.main import MainWindow
+from markerscope.app.window.showing import Showing
+from markerscope.solver.pipeline.session import Session
 
 SETTINGS: Mapping[str, Mapping[str, Any]] = {
     "landmarks": {"rate": 10.0},
@@ -73,7 +73,7 @@ class Answers:
         return 0
 
     def pictures(self) -> Sequence[Any]:
-        from app.window.exporting import report_pictures
+        from markerscope.app.window.exporting import report_pictures
 
         return report_pictures(self._window)
 

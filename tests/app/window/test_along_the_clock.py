@@ -12,12 +12,12 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QToolButton
 
-from app.models import edits
-from app.window.main import MainWindow
+from markerscope.app.models import edits
+from markerscope.app.window.main import MainWindow
+from markerscope.widgets import palette
+from markerscope.widgets.plots.rows import CurveRow, StateRow
 from tests.app.window.test_journey import changed, near, picture
 from tests.app.window.test_linked import Solved
-from widgets import palette
-from widgets.plots.rows import CurveRow, StateRow
 
 Spin = Callable[..., None]
 

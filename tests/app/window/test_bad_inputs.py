@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from app.cli_commands import DEMO_MARKERS
-from app.models import edits
-from app.models.imports import new_session
-from app.window.main import MainWindow
-from solver.io.export_csv import write_markers_csv
-from solver.io.markers_in import load_markers
-from solver.markers import Markers
-from solver.pipeline.session import InputFile, Session, save_session
+from markerscope.app.models import edits
+from markerscope.app.models.demo import DEMO_MARKERS
+from markerscope.app.models.imports import new_session
+from markerscope.app.window.main import MainWindow
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.io.export_csv import write_markers_csv
+from markerscope.solver.io.markers_in import load_markers
+from markerscope.solver.pipeline.session import InputFile, Session, save_session
 
 Spin = Callable[..., None]
 

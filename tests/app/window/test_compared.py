@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.models import edits
-from app.window.main import MainWindow
+from markerscope.app.models import edits
+from markerscope.app.window.main import MainWindow
 from tests.app.window.test_journey import changed, picture, states
 from tests.app.window.test_linked import Solved
 
@@ -68,7 +68,7 @@ def test_angles_are_told_by_another_convention_at_once(window: MainWindow, spin:
 
 
 def test_a_bone_is_the_joint_of_its_angles(window: MainWindow, spin: Spin) -> None:
-    from solver.body.skeleton import JOINTS
+    from markerscope.solver.core.skeleton import JOINTS
 
     bones = window.bench.board.current["fit"].marker_joint
     knee = JOINTS.index("left_knee")

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.models import edits
-from app.models.fields import title
-from app.window.bind_dated import DRAWN
-from app.window.main import MainWindow
-from solver.pipeline.run import keys_of, run_session
-from solver.pipeline.session import Session
-from widgets.images import to_rgb
-from widgets.plots.rows import CurveRow
-from widgets.theme import colours
+from markerscope.app.models import edits
+from markerscope.app.models.fields import title
+from markerscope.app.window.bind_dated import DRAWN
+from markerscope.app.window.main import MainWindow
+from markerscope.solver.pipeline.run import keys_of, run_session
+from markerscope.solver.pipeline.session import Session
+from markerscope.widgets.images import to_rgb
+from markerscope.widgets.plots.rows import CurveRow
+from markerscope.widgets.theme import colours
 
 Spin = Callable[..., None]
 
@@ -215,7 +215,7 @@ def test_candidates_that_are_out_of_date_are_not_pinned(window: MainWindow, spin
 
 def test_all_that_a_view_draws_is_in_its_list() -> None:
     """The lists name no stage that is not drawn, and every stage that is drawn."""
-    from app.window.shown import WANTED
+    from markerscope.app.window.shown import WANTED
 
     assert set(WANTED) == STAGES
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.window.collecting import Collecting
-from app.window.main import MainWindow
-from solver.pipeline.run import keys_of
-from solver.pipeline.session import Session
-from widgets.images import to_rgb
+from markerscope.app.window.collecting import Collecting
+from markerscope.app.window.main import MainWindow
+from markerscope.solver.pipeline.run import keys_of
+from markerscope.solver.pipeline.session import Session
+from markerscope.widgets.images import to_rgb
 
 Spin = Callable[..., None]
 

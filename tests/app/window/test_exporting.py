@@ -16,13 +16,13 @@ import pytest
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QProgressDialog
 
-from app.models.exports import formats
-from app.window import exporting
-from app.window.main import MainWindow
-from solver.io import load_markers
-from solver.pipeline.session import Session
-from widgets.dialogs.export_dialog import ExportDialog
-from widgets.images import to_rgb
+from markerscope.app.models.exports import formats
+from markerscope.app.window import exporting
+from markerscope.app.window.main import MainWindow
+from markerscope.solver.io import load_markers
+from markerscope.solver.pipeline.session import Session
+from markerscope.widgets.dialogs.export_dialog import ExportDialog
+from markerscope.widgets.images import to_rgb
 
 Spin = Callable[..., None]
 Answer = Callable[[Callable[[Any], None]], None]
@@ -221,7 +221,7 @@ def test_a_film_that_is_stopped_leaves_nothing(
 def test_messages_that_come_while_a_film_is_written_do_not_end_it(
     window: MainWindow, spin: Spin, tmp_path: Path
 ) -> None:
-    from app.models.workbench import Said
+    from markerscope.app.models.workbench import Said
 
     window.bench.clock.set_loop((2.2, 2.32))
     window.bench.say(Said("warning", "Something else", "elsewhere"))

@@ -12,10 +12,10 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit
 
-from app.cli_commands import DEMO_VIDEO
-from app.window.main import MainWindow
-from widgets.dialogs.import_dialog import ImportDialog
-from widgets.images import to_rgb
+from markerscope.app.models.demo import DEMO_VIDEO
+from markerscope.app.window.main import MainWindow
+from markerscope.widgets.dialogs.import_dialog import ImportDialog
+from markerscope.widgets.images import to_rgb
 
 Spin = Callable[..., None]
 Answer = Callable[[Callable[[Any], None]], None]

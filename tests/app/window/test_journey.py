@@ -11,10 +11,10 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
-from app.cli_commands import DEMO_MARKERS
-from app.window.main import MainWindow
-from widgets import theme
-from widgets.images import to_rgb
+from markerscope.app.models.demo import DEMO_MARKERS
+from markerscope.app.window.main import MainWindow
+from markerscope.widgets import theme
+from markerscope.widgets.images import to_rgb
 
 Spin = Callable[..., None]
 

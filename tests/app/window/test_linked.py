@@ -11,9 +11,9 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from app.window.main import MainWindow
+from markerscope.app.window.main import MainWindow
+from markerscope.widgets.panels.transport import Readout
 from tests.app.window.test_journey import changed, picture
-from widgets.panels.transport import Readout
 
 
 class Solved(Protocol):
@@ -108,7 +108,7 @@ def test_a_group_and_a_bone_are_their_markers(window: MainWindow, spin: Callable
 
 
 def _edge_of(bone: int) -> int:
-    from app.views.posing import BONE_EDGES
+    from markerscope.app.views.posing import BONE_EDGES
 
     return int(np.flatnonzero(BONE_EDGES[:, 0] == bone)[0])
 

@@ -12,11 +12,11 @@ from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeyEvent
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QWidget
 
-from app.actions import ACTIONS
-from app.window.main import MainWindow
-from solver.pipeline.session import Session
-from widgets import theme
-from widgets.images import to_rgb
+from markerscope.app.actions import ACTIONS
+from markerscope.app.window.main import MainWindow
+from markerscope.solver.pipeline.session import Session
+from markerscope.widgets import theme
+from markerscope.widgets.images import to_rgb
 
 Spin = Callable[..., None]
 

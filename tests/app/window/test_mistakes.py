@@ -10,18 +10,18 @@ from PySide6.QtCore import QTimer
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
-from app.window.main import MainWindow
-from app.window.mistakes import Mistakes
-from solver.errors import InputError
+from markerscope.app.window.main import MainWindow
+from markerscope.app.window.mistakes import Mistakes
+from markerscope.solver.core.errors import InputError
+from markerscope.widgets import guard
 from tests.widgets.drawn import pixels
-from widgets import guard
 
 
 @pytest.fixture
 def watched(open_window: Callable[[], MainWindow], monkeypatch: pytest.MonkeyPatch) -> tuple[MainWindow, Mistakes]:
     """A window whose mistakes are watched, until the test ends."""
     monkeypatch.setattr(sys, "excepthook", sys.__excepthook__)
-    monkeypatch.setattr("app.window.mistakes.guard_paints", lambda tell: None)
+    monkeypatch.setattr("markerscope.app.window.mistakes.guard_paints", lambda tell: None)
     window = open_window()
     mistakes = Mistakes(window.bench)
     mistakes.watch()

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.window.main import MainWindow
-from solver.pipeline.session import Session
+from markerscope.app.window.main import MainWindow
+from markerscope.solver.pipeline.session import Session
 from tests.app.window.test_journey import changed, picture
 
 

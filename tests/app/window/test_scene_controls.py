@@ -11,7 +11,7 @@ from PySide6.QtGui import QContextMenuEvent, QMouseEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
-from app.window.main import MainWindow
+from markerscope.app.window.main import MainWindow
 from tests.app.window.test_journey import changed, picture
 from tests.app.window.test_linked import Solved
 

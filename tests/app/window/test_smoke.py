@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from app.window.start import display_problem
-from solver.pipeline.session import Session
+from markerscope.app.window.start import display_problem
+from markerscope.solver.pipeline.session import Session
 
 ROOT = Path(__file__).parents[3]
 SCRIPT = """
@@ -21,8 +21,8 @@ import os, sys
 from pathlib import Path
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
-import app.window.main as main
-from app.cli import main as command
+import markerscope.app.window.main as main
+from markerscope.app.cli.main import main as command
 
 made = main.MainWindow.__init__
 
@@ -103,11 +103,15 @@ def display() -> Iterator[str]:
 def test_the_program_opens_its_window_and_shows_a_session(display: str, session: Session, tmp_path: Path) -> None:
     from PySide6.QtGui import QImage
 
-    from widgets.images import to_rgb
+    from markerscope.widgets.images import to_rgb
 
     unset = ("QT_QPA_PLATFORM", "WAYLAND_DISPLAY", "VTK_DEFAULT_OPENGL_WINDOW")
     environment = {name: value for name, value in os.environ.items() if name not in unset}
-    environment |= {"DISPLAY": display, "MARKERSCOPE_HOME": str(tmp_path / "home"), "PYTHONPATH": str(ROOT)}
+    environment |= {
+        "DISPLAY": display,
+        "MARKERSCOPE_HOME": str(tmp_path / "home"),
+        "PYTHONPATH": os.environ["PYTHONPATH"],
+    }
     if problem := display_problem(environment):
         pytest.skip(problem)
     shot = tmp_path / "shot.png"
@@ -129,9 +133,9 @@ def test_without_a_display_the_program_says_so_and_how_to_go_on(tmp_path: Path) 
         pytest.skip("only on Linux can there be no display")
     unset = ("QT_QPA_PLATFORM", "WAYLAND_DISPLAY", "DISPLAY")
     environment = {name: value for name, value in os.environ.items() if name not in unset}
-    environment |= {"PYTHONPATH": str(ROOT), "MARKERSCOPE_HOME": str(tmp_path / "home")}
+    environment |= {"PYTHONPATH": os.environ["PYTHONPATH"], "MARKERSCOPE_HOME": str(tmp_path / "home")}
     for display, says in (("", "there is no display"), (":9876", "does not answer")):
-        words = [sys.executable, "-m", "app"]
+        words = [sys.executable, "-m", "markerscope.app"]
         run = subprocess.run(
             words, env=environment | {"DISPLAY": display}, cwd=ROOT, capture_output=True, text=True, timeout=60
         )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.window.videos import ENDINGS, dialog_filter, is_video, videos_beside
+from markerscope.app.window.videos import ENDINGS, dialog_filter, is_video, videos_beside
 
 
 @pytest.mark.parametrize("ending", [*ENDINGS, *(ending.upper() for ending in ENDINGS), ".Mp4"])

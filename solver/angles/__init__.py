@@ -1,0 +1,1 @@
+"""Joint angles of the fitted body, in the conventions of other programs."""

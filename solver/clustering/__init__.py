@@ -1,0 +1,1 @@
+"""Markers that move rigidly together."""

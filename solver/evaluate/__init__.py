@@ -1,0 +1,1 @@
+"""How far a result, anybody's, is from the truth."""

@@ -1,0 +1,1 @@
+"""The network that takes any number of markers anywhere on the body."""

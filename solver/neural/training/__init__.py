@@ -1,0 +1,1 @@
+"""What networks learn from, and how they are trained."""

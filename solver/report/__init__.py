@@ -1,0 +1,1 @@
+"""What a solve leaves in its folder: motion, angles, markers, the report."""

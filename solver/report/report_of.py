@@ -1,0 +1,180 @@
+"""The report of a solve: the stages' results turned into what a report shows."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from markerscope.solver.angles.angles import JointAngles
+from markerscope.solver.clustering.segment import Segmentation
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.skeleton import BONES, JOINTS
+from markerscope.solver.fit.results import FittedMotion, Orientation
+from markerscope.solver.pipeline.cleaning import measured
+from markerscope.solver.pipeline.doubts import doubts
+from markerscope.solver.pipeline.session import Session
+from markerscope.solver.pipeline.stage import GraphRun
+from markerscope.solver.report.report import write_report
+from markerscope.solver.report.report_data import (
+    AngleCurve,
+    Gaps,
+    Groups,
+    Headline,
+    Hypothesis,
+    InputFile,
+    Picture,
+    ReportData,
+    Stage,
+    marker_residuals,
+)
+
+_ROLES = {
+    "marker_file": "markers",
+    "video_file": "video",
+    "prior_file": "pose prior",
+    "camera_file": "camera",
+    "body_file": "body",
+    "neutral_file": "neutral pose",
+}
+_LIBRARIES = ("numpy", "scipy", "open3d-cpu", "open3d", "ai-edge-litert", "av")
+
+
+def report_of(
+    path: Path,
+    session: Session,
+    graph: GraphRun,
+    named: Markers,
+    about: Mapping[str, Any],
+    pictures: Sequence[Picture] = (),
+) -> None:
+    """Write the report of one solve.
+
+    Parameters
+    ----------
+    named : the labelled markers, in the order of the file's
+    about : provenance: program, inputs with digests, stages with settings
+    pictures : views of the session, where somebody made them
+    """
+    write_report(path, replace(_data(session, graph, named, about), pictures=tuple(pictures)))
+
+
+def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str, Any]) -> ReportData:
+    markers, motion, ranked = measured(graph["clean"]), graph["fit"], graph["orient"]
+    notes = {"marker_file": markers.notes, "prior_file": graph["prior"].notes}
+    inputs = tuple(
+        InputFile(_ROLES.get(name, name), row["file"], row["sha256"], tuple(notes.get(name, ())))
+        for name, row in about["inputs"].items()
+    )
+    bones = tuple("" if j < 0 else BONES[JOINTS[j]].replace("_", " ") for j in motion.marker_joint)
+    stages = tuple(
+        Stage(
+            name,
+            {key: _said(value) for key, value in row["settings"].items()},
+            graph.events[name].seconds if graph.events[name].computed else None,
+        )
+        for name, row in about["stages"].items()
+    )
+    marker_file = session.inputs["marker_file"].path
+    filled = np.zeros(markers.present.shape, bool) if named.filled is None else named.filled
+    return ReportData(
+        title=marker_file.stem,
+        subtitle=f"{ranked.candidates[motion.chosen].part}, {len(motion.time)} frames at {markers.rate:g} Hz",
+        headlines=_headlines(graph, motion, ranked),
+        warnings=doubts(graph),
+        inputs=inputs,
+        groups=_groups(markers, graph["segment"]),
+        hypotheses=_hypotheses(ranked, motion),
+        margin=ranked.margin,
+        angles=_curves(graph["angles"]),
+        zero_pose=graph["angles"].zero_pose,
+        residuals=marker_residuals(named.labels, markers.labels, bones, motion.residual, markers.present, motion.time),
+        gaps=Gaps(named.labels, motion.time, markers.present, filled),
+        stages=stages,
+        versions=_versions(about),
+    )
+
+
+def _headlines(graph: GraphRun, motion: FittedMotion, ranked: Orientation) -> tuple[Headline, ...]:
+    sync, surface = graph["sync"], graph["surface"]
+    margin = f"next answer costs {ranked.margin:.2f} times" if np.isfinite(ranked.margin) else "no other answer found"
+    camera = motion.camera
+    rows = [
+        Headline("Confidence", f"{100 * graph['check'].confidence:.0f} %", margin),
+        Headline("Marker residual", f"{1000 * np.nanmedian(motion.residual):.1f} mm", "median distance from its place"),
+        Headline("Marker to skin", f"{1000 * surface.mean:.1f} mm", "mean; a marker's centre stands some 9.5 mm off"),
+        Headline(
+            "Sync offset", f"{sync.offset:+.3f} s", f"added to the video's time; confidence {sync.confidence:.2f}"
+        ),
+    ]
+    if np.isfinite(camera.reprojection_px):
+        rows.append(
+            Headline("Reprojection", f"{camera.reprojection_px:.0f} px", "median distance of the video's landmarks")
+        )
+    return tuple(rows)
+
+
+def _groups(markers: Markers, found: Segmentation) -> Groups:
+    return Groups(
+        markers.labels,
+        found.affinity,
+        found.measured,
+        found.linkage,
+        found.leaves,
+        found.order,
+        found.cut,
+        found.clusters,
+    )
+
+
+def _hypotheses(ranked: Orientation, motion: FittedMotion) -> tuple[Hypothesis, ...]:
+    return tuple(
+        Hypothesis(c.part, c.heading_deg, c.energy, c.energies, c.refined, i == motion.chosen, i == ranked.runner_up)
+        for i, c in enumerate(ranked.candidates)
+    )
+
+
+def _curves(angles: JointAngles) -> tuple[AngleCurve, ...]:
+    """One curve per angle, left and right together."""
+    columns: dict[str, dict[str, int]] = {}
+    for i, name in enumerate(angles.names):
+        title, side = _title_and_side(name, angles.names)
+        columns.setdefault(title, {})[side] = i
+    curves = []
+    for title, sides in columns.items():
+        values = {side: np.where(angles.singular[:, i], np.nan, angles.degrees[:, i]) for side, i in sides.items()}
+        if not any(np.isfinite(v).any() for v in values.values()):
+            continue
+        flagged = np.any([angles.singular[:, i] for i in sides.values()], axis=0)
+        curves.append(AngleCurve(title, "degrees", angles.time, values, flagged))
+    return tuple(curves)
+
+
+def _title_and_side(name: str, names: tuple[str, ...]) -> tuple[str, str]:
+    """What a column is of, and of which side: conventions put ``_r`` at the end or ``R`` at the start."""
+    words = name.replace("_", " ")
+    for end, side in (("_r", "right"), ("_l", "left")):
+        if name.endswith(end):
+            return words[:1].upper() + words[1:-2], side
+    for start, other, side in (("R", "L", "right"), ("L", "R", "left")):
+        if name.startswith(start) and other + name[1:] in names:
+            return words[1:], side
+    return words[:1].upper() + words[1:], ""
+
+
+def _said(value: Any) -> str:
+    return "as found" if value is None else str(value)
+
+
+def _versions(about: Mapping[str, Any]) -> dict[str, str]:
+    found = {"program": str(about["program"]).removeprefix("markerscope ")}
+    for name in _LIBRARIES:
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found

@@ -1,0 +1,1 @@
+"""The video's clock against the markers'."""

@@ -1,0 +1,69 @@
+"""What the stated confidence does with the margin, and what a subject that stands still takes from it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.fit.confidence import judge
+from markerscope.solver.fit.results import Candidate, Orientation
+
+LEG = [INDEX[name] for name in ("left_hip", "left_hip", "left_knee", "left_knee", "left_ankle", "left_ankle")]
+ARM = [INDEX[name] for name in ("left_shoulder", "left_shoulder", "left_elbow", "left_elbow", "left_wrist", "spine3")]
+MARGINS = (1.0, 1.05, 1.13, 1.27, 1.5, 2.0, 4.0)
+
+
+def candidate(energy: float, bones: list[int], swing_deg: float) -> Candidate:
+    """A refined answer in which every joint turns by ``swing_deg`` over 50 keyframes."""
+    swing = np.radians(np.linspace(0, swing_deg, 50))[:, None, None] * np.array([1.0, 0, 0])
+    rotations = exp_so3(np.broadcast_to(swing, (50, 24, 3)))
+    count, nowhere = len(bones), np.zeros((len(bones), 3))
+    shares = dict.fromkeys(("markers", "prior", "anatomical", "image", "shape", "placement"), energy / 6)
+    return Candidate(
+        hypothesis=0, refined=True, energies=shares, energy=energy, bone=np.array(bones), vertex=np.arange(count),
+        part="left leg", heading_deg=0.0, camera=CameraResult(np.eye(3), np.zeros(3), 900.0, (640, 480), 4.0),
+        rest=nowhere, dirs=np.zeros((count, 3, 10)), weights=np.eye(24)[bones], surface=nowhere,
+        normal=np.tile([0.0, 0, 1], (count, 1)), betas=np.zeros(10), rotations=rotations, trans=np.zeros((50, 3)),
+        trace=(energy,),
+    )  # fmt: skip
+
+
+def judged(margin: float, swing_deg: float = 90.0) -> Orientation:
+    return judge((candidate(10.0, LEG, swing_deg), candidate(10.0 * margin, ARM, swing_deg)))
+
+
+def test_the_confidence_rises_with_the_margin_from_a_half_at_a_tie() -> None:
+    found = [judged(margin) for margin in MARGINS]
+    assert [one.margin for one in found] == pytest.approx(MARGINS)
+    assert all(one.runner_up == 1 for one in found)
+    stated = [one.confidence for one in found]
+    assert stated[0] == pytest.approx(0.5, abs=0.02)
+    assert (np.diff(stated) > 0).all(), stated
+    assert 0.98 < stated[-1] <= 1, stated
+
+
+@pytest.mark.parametrize(("margin", "published"), [(1.13, 0.74), (1.27, 0.89)])
+def test_the_confidence_is_the_calibrated_one(margin: float, published: float) -> None:
+    """The two that the README prints beside the margins they came from."""
+    assert judged(margin).confidence == pytest.approx(published, abs=0.02)
+
+
+def test_a_subject_that_stands_still_is_never_sure_however_large_the_margin() -> None:
+    moving, still = judged(4.0), judged(4.0, swing_deg=2.0)
+    assert moving.confidence > 0.9
+    assert not any("hardly moves" in words for words in moving.warnings)
+    assert still.confidence <= 0.6
+    assert any("hardly moves" in words for words in still.warnings)
+    assert judged(1.0, swing_deg=2.0).confidence <= 0.5 + 0.02, "the cap raises nothing"
+
+
+def test_the_nearest_different_answer_is_the_rival() -> None:
+    best, alike, rival, coarse = (candidate(energy, bones, 90.0) for energy, bones in
+                                  ((10.0, LEG), (10.1, LEG), (15.0, ARM), (10.2, ARM)))  # fmt: skip
+    object.__setattr__(coarse, "refined", False)
+    found = judge((best, alike, rival, coarse))
+    assert found.runner_up == 2, "the same answer again and one that was never refined say nothing"
+    assert found.margin == pytest.approx(1.5)

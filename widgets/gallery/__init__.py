@@ -1,0 +1,1 @@
+"""Every widget alone, on made-up data."""
