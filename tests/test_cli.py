@@ -316,7 +316,8 @@ def test_the_manual_describes_exactly_the_options_there_are(capsys) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="signals are sent otherwise elsewhere")
 def test_control_c_ends_a_real_run(markers: Path, tmp_path: Path) -> None:
     code = (
-        "import signal, sys, time; from markerscope.app.cli.main import main; from markerscope.app.cli.commands import Services\n"
+        "import signal, sys, time\n"
+        "from markerscope.app.cli.main import main; from markerscope.app.cli.commands import Services\n"
         # a shell's background jobs ignore the signal, and hand that down
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "def solve(request, progress): print('ready', flush=True); time.sleep(60)\n"

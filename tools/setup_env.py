@@ -1,9 +1,9 @@
 """Set up everything Markerscope needs, then run a command: ``python3 tools/setup_env.py [--dev] [COMMAND ...]``.
 
 Makes ``.venv`` beside this folder with the versions of ``constraints.txt``, with ``--dev`` the tools for tests and
-development too, and on Debian, as root, installs the missing system libraries; another user is shown the exact line to
-run. A second run finds nothing to do and is instant. Uses the standard library alone and starts on any Python 3, so
-that it can say which one is needed.
+development too, connects it to this folder by the links that ``links.py`` makes, and on Debian, as root, installs the
+missing system libraries; another user is shown the exact line to run. A second run finds nothing to do and is instant.
+Uses the standard library alone and starts on any Python 3, so that it can say which one is needed.
 """
 
 from __future__ import annotations
@@ -11,11 +11,13 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+import shlex
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import links
 import torch_build
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -74,6 +76,7 @@ def main(command: list[str]) -> int:
         development = development or is_set_up(True, stale=True)
         install_packages(development)
         STAMP.write_text(fingerprint(development), encoding="utf-8")
+    links.write_links(ROOT)
     return run_in_environment(command) if command else 0
 
 
@@ -118,7 +121,8 @@ def is_set_up(development: bool, stale: bool = False) -> bool:
 def fingerprint(development: bool) -> str:
     """What the environment was made from and what for; another answer means it must be made again."""
     digest = hashlib.sha256()
-    for part in (ROOT / "pyproject.toml", ROOT / "constraints.txt", Path(__file__), Path(torch_build.__file__)):
+    own = (Path(__file__), Path(links.__file__), Path(torch_build.__file__))
+    for part in (ROOT / "pyproject.toml", ROOT / "constraints.txt", *own):
         digest.update(part.read_bytes())
     return f"{digest.hexdigest()} {ROOT} {sys.version.split()[0]}{WITH_TOOLS if development else chr(10)}"
 
@@ -178,7 +182,7 @@ def make_environment() -> None:
 
 
 def install_packages(development: bool) -> None:
-    """Install Markerscope, and its test and development tools if asked for, at the versions of ``constraints.txt``."""
+    """Install what Markerscope needs, and tools for tests and development if asked for, as ``constraints.txt`` says."""
     pip = (PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-cache-dir")  # else every package lies here twice
     constraints = ROOT / "constraints.txt"
     run(*pip, "install", "--quiet", "--constraint", constraints, "pip", "setuptools")
@@ -190,10 +194,38 @@ def install_packages(development: bool) -> None:
     say(f"downloading up to {PROGRAM_MB + tools + choice.megabytes} MB, once; this takes a few minutes")
     if choice.index and not torch_build.fetch_cpu_build(pip, version, choice.index):
         say(f"the download from {choice.index} failed, so torch is what pip finds: maybe the CUDA build, some 5 GB")
-    extras = "[test,dev]" if development else ""
+    run(*pip, "uninstall", "--quiet", "--quiet", "--yes", "markerscope")  # whose finder an older set-up left
     # Python compiles the tenth of the modules that is used as it is first imported.
-    run(*pip, "install", "--no-compile", "--constraint", constraints, "--editable", f"{ROOT}{extras}")
+    run(*pip, "install", "--no-compile", "--constraint", constraints, *requirements(development))
     run(*pip, "check")
+    connect()
+
+
+def requirements(development: bool) -> list[str]:
+    """What ``pyproject.toml`` says that the program needs, and its tests and development."""
+    import tomllib  # since Python 3.11
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    return [*project["dependencies"], *(extras["test"] + extras["dev"] if development else [])]
+
+
+def connect() -> None:
+    """Put this tree on the environment's path, and the command ``markerscope`` among its programs.
+
+    By a ``.pth`` file, where an editable install would put a finder, which gives way to every folder of the working
+    directory that is called as the package is. ``-P`` keeps that directory away from the command altogether.
+    """
+    ask = [str(PYTHON), "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"]
+    packages = Path(subprocess.run(ask, capture_output=True, text=True, check=True).stdout.strip())
+    (packages / "markerscope.pth").write_text(f"{links.write_links(ROOT)}\n", encoding="locale")
+    if os.name == "nt":
+        (BIN / "markerscope.cmd").write_text('@"%~dp0python.exe" -P -m markerscope.app %*\n', encoding="ascii")
+    else:
+        command = BIN / "markerscope"
+        command.unlink(missing_ok=True)
+        command.write_text(f'#!/bin/sh\nexec {shlex.quote(str(PYTHON))} -P -m markerscope.app "$@"\n', encoding="utf-8")
+        command.chmod(0o755)
 
 
 def run_in_environment(command: list[str]) -> int:
