@@ -3,6 +3,9 @@
 A value may be None, a bool, int, float, str, numpy array or scalar, a tuple, list, dict or frozenset of such
 values, or a dataclass of them. Dataclasses are rebuilt only if the declared type names them (or ``also`` does): a
 document cannot make anything else come to life.
+
+A dataclass is stored under its name alone, wherever it is defined. One that is renamed keeps its results by
+``STORED_AS: ClassVar[str]``, the name that it had. Version 0.1 stored the module as well, which is not looked at.
 """
 
 from __future__ import annotations
@@ -46,9 +49,7 @@ def decode(document: Document, arrays: Mapping[str, np.ndarray], declared: Any, 
     ------
     CodecError : the document is damaged, or names a class or field that ``declared`` does not have
     """
-    allowed: dict[str, type] = {}
-    for hint in (declared, *also):
-        _collect_dataclasses(hint, allowed)
+    allowed = dataclasses_in((declared, *also))
     try:
         return _decode(document, arrays, allowed)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
@@ -56,8 +57,8 @@ def decode(document: Document, arrays: Mapping[str, np.ndarray], declared: Any, 
 
 
 def type_name(cls: type) -> str:
-    """The name a dataclass is stored under."""
-    return f"{cls.__module__}.{cls.__qualname__}"
+    """The name a dataclass is stored under: the same for good, or results of earlier versions are computed again."""
+    return str(cls.__dict__.get("STORED_AS", cls.__name__))
 
 
 def _encode(value: Any, arrays: dict[str, np.ndarray]) -> Document:
@@ -101,7 +102,7 @@ def _decode(document: Document, arrays: Mapping[str, np.ndarray], allowed: Mappi
     if not isinstance(document, dict):
         return document
     if "$type" in document:
-        cls = allowed[document["$type"]]
+        cls = allowed[document["$type"].rpartition(".")[2]]
         return cls(**{name: _decode(item, arrays, allowed) for name, item in document["fields"].items()})
     ((tag, content),) = document.items()
     if tag == "$array":
@@ -120,11 +121,23 @@ def _decode(document: Document, arrays: Mapping[str, np.ndarray], allowed: Mappi
     raise KeyError(tag)
 
 
-def _collect_dataclasses(hint: Any, found: dict[str, type]) -> None:
-    """Add the dataclasses that an annotation mentions, and those in their fields, by stored name."""
-    for argument in typing.get_args(hint):
-        _collect_dataclasses(argument, found)
-    if dataclasses.is_dataclass(hint) and isinstance(hint, type) and type_name(hint) not in found:
-        found[type_name(hint)] = hint
-        for field_hint in typing.get_type_hints(hint).values():
-            _collect_dataclasses(field_hint, found)
+def dataclasses_in(hints: Iterable[Any]) -> dict[str, type]:
+    """The dataclasses that annotations mention, and those in their fields, by the name they are stored under.
+
+    Raises
+    ------
+    TypeError : two of them would be stored under one name
+    """
+    found: dict[str, type] = {}
+    frontier = list(hints)
+    while frontier:
+        hint = frontier.pop()
+        frontier += typing.get_args(hint)
+        if dataclasses.is_dataclass(hint) and isinstance(hint, type):
+            known = found.get(type_name(hint))
+            if known is None:
+                found[type_name(hint)] = hint
+                frontier += typing.get_type_hints(hint).values()
+            elif known is not hint:
+                raise TypeError(f"{known} and {hint} would be stored under one name, {type_name(hint)}")
+    return found
