@@ -11,16 +11,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from markerscope.solver.angles.angles import (
-    AngleSettings,
-    JointAngles,
-    _columns,
-    conventions,
-    evidence,
-    joint_angles,
-    read_angles,
-)
+from markerscope.solver.angles.angles import AngleSettings, _columns, conventions, evidence, joint_angles, read_angles
 from markerscope.solver.body.model import Body
+from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.markers import lab_rotation
 from markerscope.solver.core.skeleton import INDEX, JOINTS, mirror_index
 from markerscope.solver.io.export_angles import angles_long_csv, write_angles

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from markerscope.app.cli.main import main
-from markerscope.solver.angles.angles import AngleSettings, JointAngles, joint_angles, relative_to
+from markerscope.solver.angles.angles import AngleSettings, joint_angles, relative_to
 from markerscope.solver.body.model import Body
+from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.request import parse_neutral

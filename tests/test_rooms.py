@@ -29,6 +29,7 @@ ROOMS = (
     "solver.datasets",
     "solver.fit",
     "solver.fit.labelled",
+    "solver.fit.known",
     "solver.fit.published",
     "solver.neural",
     "solver.neural.training",

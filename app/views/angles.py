@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 
 from markerscope.app.views.colours import RGB
-from markerscope.solver.angles.angles import JointAngles, conventions, evidence
+from markerscope.solver.angles.angles import conventions, evidence
+from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.skeleton import JOINTS
 from markerscope.widgets import palette
 

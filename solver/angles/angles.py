@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Literal
 
@@ -13,6 +13,7 @@ import numpy as np
 from markerscope.resources import resource
 from markerscope.solver.angles.cardan import TURNS, about_axes, cardan
 from markerscope.solver.body.anatomy import SEGMENT_JOINT, segment_frames
+from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.markers import lab_rotation
 from markerscope.solver.core.rotations import exp_so3
 from markerscope.solver.core.skeleton import INDEX, JOINTS, PARENTS
@@ -30,7 +31,6 @@ _PAIRS = {
     "wrist": ("forearm", "hand"),
 }
 """Proximal and distal segment of each joint; the pelvis is read in the lab."""
-_JUMP_DEG = 120.0
 _MIDLINE = ("", "pelvis", "thorax")
 _MIRROR = np.array([1.0, 1, -1])
 _CARRIERS = {
@@ -63,64 +63,6 @@ class AngleSettings:
     """
 
     convention: Convention = "opensim"
-
-
-@dataclass(frozen=True)
-class JointAngles:
-    """Joint angles over time.
-
-    Attributes
-    ----------
-    time : (T,) s, the marker file's clock
-    names : A column names
-    degrees : (T, A), each frame within what the joint can do, whatever came before
-    singular : (T, A) True where the sequence cannot tell this angle from another: its value means nothing there
-    convention, title : which convention, and what it is
-    sequence : A, the intrinsic sequence, or the axes, that each angle is part of
-    positive : A, what a positive value means
-    zero_pose : what the angles are counted from
-    neutral : (A,) degrees that were taken off, the angles of the neutral pose; 0 where nothing was
-    zero : "recorded", or "neutral" where angles are relative to a neutral pose
-    neutral_pose : what the neutral pose was read off, in words
-    """
-
-    time: np.ndarray
-    names: tuple[str, ...]
-    degrees: np.ndarray
-    singular: np.ndarray
-    convention: str
-    title: str
-    sequence: tuple[str, ...]
-    positive: tuple[str, ...]
-    zero_pose: str
-    neutral: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    zero: Literal["recorded", "neutral"] = "recorded"
-    neutral_pose: str = ""
-
-    @property
-    def as_recorded(self) -> JointAngles:
-        """The same angles as the convention counts them, whatever the neutral pose."""
-        if self.zero == "recorded":
-            return self
-        return replace(
-            self,
-            degrees=self.degrees + self.neutral,
-            zero_pose=conventions()[self.convention]["zero_pose"],
-            neutral=np.zeros(0),
-            zero="recorded",
-            neutral_pose="",
-        )
-
-    @property
-    def jumps(self) -> np.ndarray:
-        """(T, A) True where a defined angle is over 120 degrees from the frame before: the reading changed, no joint.
-
-        An angle that goes round comes in again at the other end of its range.
-        """
-        found = np.zeros(self.degrees.shape, dtype=bool)
-        defined = ~self.singular
-        found[1:] = (np.abs(np.diff(self.degrees, axis=0)) > _JUMP_DEG) & defined[1:] & defined[:-1]
-        return found
 
 
 @cache
@@ -217,6 +159,7 @@ def relative_to(angles: JointAngles, neutral: JointAngles, where: str, same_head
         neutral=offset,
         zero="neutral",
         neutral_pose=where,
+        recorded_zero_pose=angles.zero_pose,
     )
 
 

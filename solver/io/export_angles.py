@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from markerscope.solver.angles.angles import JointAngles
+from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.plain import json_text
 from markerscope.solver.io.atomic import write_text_atomic
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from markerscope.solver.angles.angles import AngleSettings, JointAngles
+from markerscope.solver.angles.angles import AngleSettings
 from markerscope.solver.clustering.segment import Segmentation, SegmentSettings
+from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.camera import CameraResult
 from markerscope.solver.core.progress import Progress
 from markerscope.solver.fit.doubts.rules import Verdict

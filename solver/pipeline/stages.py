@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from markerscope.solver.angles.angles import AngleSettings, JointAngles
+from markerscope.solver.angles.angles import AngleSettings
 from markerscope.solver.body.model import EMBEDDED
 from markerscope.solver.cleaning.clean import Cleaned
 from markerscope.solver.clustering.segment import Segmentation, SegmentSettings
+from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.landmarks import Landmarks
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.prior import PosePrior

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from markerscope.solver.angles.angles import JointAngles
 from markerscope.solver.clustering.segment import Segmentation
+from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.skeleton import BONES, JOINTS
 from markerscope.solver.fit.results import FittedMotion, Orientation

@@ -16,8 +16,9 @@ from hypothesis.extra.numpy import arrays
 from markerscope.app.views.angles import angles_picture, bones_of, joint_of, title_of
 from markerscope.app.views.markers import gap_lengths, marker_table
 from markerscope.app.views.tracks import MEASURED, tracks_of
-from markerscope.solver.angles.angles import AngleSettings, Convention, JointAngles, conventions, evidence, joint_angles
+from markerscope.solver.angles.angles import AngleSettings, Convention, conventions, evidence, joint_angles
 from markerscope.solver.clustering.segment import segment
+from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.skeleton import JOINTS
 from markerscope.solver.fit.doubts.rules import Verdict
 from tests.app.views.conftest import Made
