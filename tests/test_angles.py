@@ -12,6 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from markerscope.solver.angles.angles import AngleSettings, _columns, conventions, evidence, joint_angles, read_angles
+from markerscope.solver.body.anatomy import MODEL_HUMERUS, MODEL_THORAX
 from markerscope.solver.body.model import Body
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.markers import lab_rotation
@@ -92,8 +93,11 @@ def test_random_angles_come_back(name: str) -> None:
 # -- plain movements of a square body, by hand -------------------------------------------------------------------
 
 
-def square_body() -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Landmarks and joint centres of a body in the T-pose whose segment frames are all exactly square."""
+def square_body(convention: str) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Landmarks and joint centres of a body in the T-pose whose segment frames are all exactly square.
+
+    For the conventions of OpenSim its thorax and upper arms are those of the model, which stand square there.
+    """
     joints = np.zeros((24, 3))
     left = {
         "hip": (0.1, 0, 0),
@@ -129,6 +133,18 @@ def square_body() -> tuple[dict[str, np.ndarray], np.ndarray]:
             joints[INDEX[f"{side}_{name}"]] = flip * place
         for name, place in skin.items():
             landmarks[f"{side}_{name}"] = flip * np.array(place)
+    if conventions()[convention]["thorax"] == "model":
+        landmarks |= {name: np.array([0, up, ahead]) for name, (ahead, up) in MODEL_THORAX.items()}
+        for side, out in (("left", 1), ("right", -1)):
+            # Down the arm is outward here, forward is forward, and the lateral side is up.
+            at = {name: np.array([-out * down, aside, ahead]) for name, (ahead, down, aside) in MODEL_HUMERUS.items()}
+            shift = joints[INDEX[f"{side}_shoulder"]] + at["elbow"] - joints[INDEX[f"{side}_elbow"]]
+            for name in ("elbow", "wrist", "hand"):
+                joints[INDEX[f"{side}_{name}"]] += shift
+            for name in ("wrist_radius", "wrist_ulna"):
+                landmarks[f"{side}_{name}"] = landmarks[f"{side}_{name}"] + shift
+            for name in ("elbow_lateral", "elbow_medial"):
+                landmarks[f"{side}_{name}"] = joints[INDEX[f"{side}_shoulder"]] + at[name]
     for name, height in (("spine1", 0.1), ("spine2", 0.2), ("spine3", 0.35), ("neck", 0.55), ("head", 0.65)):
         joints[INDEX[name]] = (0, height, 0)
     return landmarks, joints
@@ -146,7 +162,7 @@ def angles_of(convention: str, **joints: np.ndarray) -> dict[str, float]:
     for name, matrix in (STANDING | joints).items():
         rotations[0, INDEX[name]] = matrix
     rotations[:, 0] = TO_LAB @ rotations[:, 0]
-    found = joint_angles(np.zeros(1), rotations, *square_body(), AngleSettings(convention=convention))  # type: ignore[arg-type]
+    found = joint_angles(np.zeros(1), rotations, *square_body(convention), AngleSettings(convention=convention))  # type: ignore[arg-type]
     values = np.where(found.singular, np.nan, found.degrees)[0]
     return dict(zip(found.names, values, strict=True))
 
@@ -596,7 +612,7 @@ def raised_arm() -> JointAngles:
         rotations[:, INDEX[name]] = matrix
     for i, abduction in enumerate(np.arange(70.5, 111.5)):
         rotations[i, INDEX["right_shoulder"]] = turn(z=90 - abduction)
-    return joint_angles(np.arange(41) / 100, at_home(rotations), *square_body(), AngleSettings())
+    return joint_angles(np.arange(41) / 100, at_home(rotations), *square_body("opensim"), AngleSettings())
 
 
 def test_singular_frames_are_empty_in_the_csv_and_counted_beside_it(tmp_path: Path) -> None:

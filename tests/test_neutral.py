@@ -19,7 +19,7 @@ from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.request import parse_neutral
 from markerscope.solver.core.rotations import exp_so3
 from markerscope.solver.fit.kinematics import Points
-from markerscope.solver.fit.neutral import Neutral, NeutralSettings, facing, neutral_file, neutral_span
+from markerscope.solver.fit.known.neutral import Neutral, NeutralSettings, facing, neutral_file, neutral_span
 from markerscope.solver.fit.results import FittedMotion
 from tests.fit.test_known import fitted, standing
 

@@ -21,8 +21,8 @@ from markerscope.solver.body.model import Body
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.prior import PosePrior
 from markerscope.solver.core.rotations import exp_so3, slerp
+from markerscope.solver.fit.known.neutral import Neutral, facing
 from markerscope.solver.fit.localize import R_LAB_UPRIGHT_CAMERA
-from markerscope.solver.fit.neutral import Neutral, facing
 from markerscope.solver.fit.published.results import PaperLocalization, Trace
 from markerscope.solver.fit.results import Candidate, FittedMotion, Localization
 from markerscope.solver.sync.offset import Sync

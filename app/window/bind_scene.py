@@ -44,7 +44,7 @@ class SceneBinder:
         self._framed = False
         self._own_view: dict[str, Any] | None = None
         self._body: tuple[object, ...] | None = None
-        self._bones: tuple[BodyTrack, float] | None = None
+        self._bones: tuple[BodyTrack, float, bool] | None = None
         self._legend: tuple[object, ...] | None = None
         self._ghost_layers: set[str] = set()
         bench.clock.moved.connect(lambda time: self.draw())
@@ -132,10 +132,11 @@ class SceneBinder:
 
     def _show_bones(self, track: BodyTrack, time: float) -> None:
         """The bones inside the body; as they are where they are these already."""
-        wanted = track, time
-        if self._bones is None or self._bones[0] is not track or self._bones[1] != time:
+        wanted = track, time, self.shown.stale("fit")
+        if self._bones is None or self._bones[0] is not track or self._bones[1:] != wanted[1:]:
             self._bones = wanted
-            self.widget.set_mesh("bones", track.bones.at(track.pose(time)), track.bones.faces, _IVORY)
+            colour = _OLD_BONE if wanted[2] else _IVORY
+            self.widget.set_mesh("bones", track.bones.at(track.pose(time)), track.bones.faces, colour)
 
     def _clear_bones(self) -> None:
         self._bones = None
@@ -146,10 +147,12 @@ class SceneBinder:
         self.widget.set_mesh("body", None, _NONE)
 
     def _bone_colours(self) -> Any:
-        bone, old, look = self.bench.selection.bone, self.shown.stale("fit"), theme.colours()
+        """As the bones where these are shown, among which the lines then hide; grey where they are out of date."""
+        bone, old, among_bones = self.bench.selection.bone, self.shown.stale("fit"), self.bench.display.layers["bones"]
         if bone is None and not old:
-            return None
-        colours = np.tile(np.array(_OLD_BONE if old else look.bone, dtype=np.uint8), (len(BONE_EDGES), 1))
+            return _IVORY if among_bones else None
+        plain = _OLD_BONE if old else _IVORY if among_bones else theme.colours().bone
+        colours = np.tile(np.array(plain, dtype=np.uint8), (len(BONE_EDGES), 1))
         if bone is not None:
             colours[BONE_EDGES[:, 0] == bone] = palette.SELECTED
         return colours

@@ -17,6 +17,8 @@ from markerscope.solver.core.skeleton import INDEX
 UPRIGHT = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])
 """The frame of a segment that stands square in the rest pose: X forward, Y up, Z right."""
 
+_MIRROR = np.array([1.0, 1, -1])
+
 MODEL_THORAX = {
     "c7": (-0.074, 0.414),
     "t8": (-0.097, 0.222),
@@ -26,10 +28,13 @@ MODEL_THORAX = {
 """m forward and up in the torso of Rajagopal et al. (2016): spinous processes, jugular notch and end of the sternum,
 read off the bones ``hat_spine`` and ``hat_ribs_scap``, and 10 mm of skin behind, 5 on the notch, 8 on the xiphoid."""
 
-_ARM_FORWARD, _ARM_OUTWARD, _ARM_INWARD_TURN = np.radians([-2.9, -1.5, -7.9])
-"""The humerus' frame in the model of Rajagopal et al. 2016 (whose bone is ``humerus_rv``), seen from the frame that the
-same bone's epicondyles and the model's shoulder and elbow make: turns about Z, X and Y of the right arm. The line
-through the epicondyles points 8 degrees forward of the model's Z axis, the elbow in front of its Y axis."""
+MODEL_HUMERUS = {
+    "elbow": (0.013144, -0.286273, -0.009595),
+    "elbow_lateral": (0.0106, -0.2800, 0.0243),
+    "elbow_medial": (0.0027, -0.2796, -0.0327),
+}
+"""m forward, up and to the right of the shoulder in the right humerus of Rajagopal et al. (2016): its elbow, and the
+epicondyles of its bone ``humerus_rv``. Their line points 8 degrees forward of the model's Z axis."""
 
 SEGMENT_JOINT = {
     "pelvis": "pelvis",
@@ -118,23 +123,15 @@ def _model_thorax(landmarks: Mapping[str, np.ndarray]) -> np.ndarray:
     body = np.stack([landmarks[name] @ UPRIGHT for name in MODEL_THORAX])[:, :2]
     (forward, up), (x, y) = (model - model.mean(axis=0)).T, (body - body.mean(axis=0)).T
     angle = np.arctan2((forward * y - up * x).sum(), (forward * x + up * y).sum())
-    return UPRIGHT @ _turn("Z", angle)
+    cos, sin = np.cos(angle), np.sin(angle)
+    return UPRIGHT @ np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
 
 
 def _model_arm(side: str) -> np.ndarray:
-    """The model's humerus seen from the frame of the epicondyles; mirrored on the left."""
-    sign = 1 if side == "right" else -1
-    return _turn("Z", _ARM_FORWARD) @ _turn("X", sign * _ARM_OUTWARD) @ _turn("Y", sign * _ARM_INWARD_TURN)
-
-
-def _turn(axis: Literal["X", "Y", "Z"], angle: float) -> np.ndarray:
-    """(3, 3) right-handed rotation about one axis, rad."""
-    place = "XYZ".index(axis)
-    one, two = (place + 1) % 3, (place + 2) % 3
-    matrix = np.eye(3)
-    matrix[[one, two], [one, two]] = np.cos(angle)
-    matrix[two, one], matrix[one, two] = np.sin(angle), -np.sin(angle)
-    return matrix
+    """The model's humerus seen from the frame that its elbow and epicondyles make; mirrored on the left."""
+    elbow, lateral, medial = (np.array(point) for point in MODEL_HUMERUS.values())
+    seen = _along(-elbow, lateral - medial).T
+    return seen if side == "right" else _MIRROR[:, None] * seen * _MIRROR
 
 
 def _along(proximal: np.ndarray, right: np.ndarray) -> np.ndarray:

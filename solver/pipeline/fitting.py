@@ -14,7 +14,7 @@ from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.camera import CameraResult
 from markerscope.solver.core.progress import Progress
 from markerscope.solver.fit.doubts.rules import Verdict
-from markerscope.solver.fit.neutral import Neutral, NeutralSettings
+from markerscope.solver.fit.known.neutral import Neutral, NeutralSettings
 from markerscope.solver.fit.results import FittedMotion, Localization, Orientation
 from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
 from markerscope.solver.fit.surface import SurfaceDistance
@@ -88,7 +88,7 @@ def _body(given: Mapping[str, Any]) -> Body:
 
 def find_neutral(given: Mapping[str, Any], settings: NeutralSettings, progress: Progress) -> Neutral:
     """The pose that angles are counted from, if the user named one."""
-    from markerscope.solver.fit.neutral import neutral_file, neutral_span
+    from markerscope.solver.fit.known.neutral import neutral_file, neutral_span
     from markerscope.solver.io import load_markers
 
     path, motion = given["neutral_file"], given["fit"]
@@ -103,7 +103,7 @@ def find_neutral(given: Mapping[str, Any], settings: NeutralSettings, progress: 
 def read_angles(given: Mapping[str, Any], settings: AngleSettings, progress: Progress) -> JointAngles:
     """Joint angles of the fitted body, relative to the neutral pose where there is one."""
     from markerscope.solver.angles.angles import joint_angles, relative_to
-    from markerscope.solver.fit.neutral import facing
+    from markerscope.solver.fit.known.neutral import facing
 
     body, motion, neutral = _body(given), given["fit"], given["neutral"]
     shaped = body.landmarks(motion.betas), body.joints(motion.betas)

@@ -52,7 +52,7 @@ _BESIDE: dict[str, tuple[str, str, float, tuple[float, float, float]]] = {
     "thigh_front": ("hip", "knee", 0.45, _FRONT),
     "shank": ("knee", "ankle", 0.5, (1.0, 0, 0.2)),
     "shin": ("knee", "ankle", 0.4, (0.2, 0, 1.0)),
-    "hallux": ("foot", "foot", 0.0, (-0.4, 0.6, 1.0)),
+    "hallux": ("foot", "foot", 0.0, (-0.3, 0.1, 1.0)),
     "clavicle": ("collar", "shoulder", 0.4, (0, 0.6, 0.8)),
     "scapula": ("collar", "shoulder", 0.3, (0, -0.4, -1.0)),
     "front_head": ("head", "head", 0.0, (0.6, 1.1, 0.9)),

@@ -111,7 +111,7 @@ def test_the_upper_arm_of_the_model_is_turned_against_its_epicondyles(body: Body
         points = {f"{side}_elbow_lateral": place @ lateral, f"{side}_elbow_medial": place @ medial}
         frames = segment_frames({**body.landmarks(rest), **points}, joints, **OPENSIM)
         off = np.degrees(np.arccos((np.trace(UPRIGHT.T @ frames[f"{side}_upper_arm"]) - 1) / 2))
-        assert off < 0.2, f"{side}: {off:.2f} degrees"
+        assert off < 0.01, f"{side}: {off:.3f} degrees"
 
 
 def test_the_thorax_of_the_model_is_laid_over_its_landmarks(body: Body) -> None:

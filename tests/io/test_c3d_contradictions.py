@@ -111,8 +111,17 @@ def test_scale_of_whole_numbers_is_the_parameters(tmp_path: Path, count: int) ->
     assert any("1 for the scale and the parameters 0.1" in note for note in markers.notes)
 
 
-def test_where_nothing_fits_it_is_refused(tmp_path: Path) -> None:
-    data = c3d_bytes(walk(40, 6), header={"count": 9}, point={"USED": np.array(11)})
+def test_of_two_readings_of_one_size_the_smooth_one_is_taken(tmp_path: Path) -> None:
+    xyz = walk(40, 6)
+    noise = np.random.default_rng(0).integers(-800, 800, (40, 1, 8))
+    nothing = {"ANALOG": {"USED": np.array(0), "RATE": np.array(100.0)}}
+    markers = read(tmp_path / "a.c3d", c3d_bytes(xyz, analog=noise, point={"USED": np.array(8)}, groups=nothing))
+    np.testing.assert_allclose(markers.positions * 1000, xyz, atol=1e-3)
+
+
+@pytest.mark.parametrize(("header", "parameter"), [(9, 11), (2, 3), (5, 4)])
+def test_where_nothing_fits_it_is_refused(tmp_path: Path, header: int, parameter: int) -> None:
+    data = c3d_bytes(walk(40, 6), header={"count": header}, point={"USED": np.array(parameter)})
     with pytest.raises(InputError, match=r"disagree on the number of points, and neither fits"):
         read(tmp_path / "a.c3d", data)
 

@@ -243,3 +243,24 @@ def test_rows_in_which_all_is_lost_keep_their_place(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(table([flat(), *cells(xyz)]))
     markers = load_markers(tmp_path / "a.csv", units="mm", up="z", rate=100)
     np.testing.assert_allclose(markers.positions * 1000, xyz, atol=1e-6)
+
+
+@pytest.mark.parametrize("lost", ["", "#N/A", "NaN"])
+def test_first_rows_in_which_all_is_lost_keep_their_place(tmp_path: Path, lost: str) -> None:
+    xyz = places(20, 0)
+    xyz[:5] = np.nan
+    rows = [["walk", *row] for row in timed(cells(xyz, lost))]
+    (tmp_path / "a.csv").write_text(table([["trial", "time", *flat()], *rows]))
+    markers = load_markers(tmp_path / "a.csv", units="mm", up="z")
+    assert markers.first_time == 0
+    np.testing.assert_allclose(markers.positions * 1000, xyz, atol=1e-6)
+
+
+def test_a_thousand_without_decimals_goes_by_the_other_cells(tmp_path: Path) -> None:
+    xyz = places(20, 0)
+    xyz[5] = np.round(xyz[5]) + 1000
+    rows = timed(cells(xyz, "", lambda value: german(value).removesuffix(",00")))
+    (tmp_path / "a.tsv").write_text(
+        table([["time", *flat()], *[[row[0].replace(".", ","), *row[1:]] for row in rows]], "\t")
+    )
+    np.testing.assert_allclose(load_markers(tmp_path / "a.tsv", units="mm", up="z").positions * 1000, xyz, atol=1e-6)

@@ -164,3 +164,12 @@ def test_a_time_column_that_cannot_be_used_is_said(numbered: bool) -> None:
         line = even_grid(np.array(time), frame, 10.0)
         assert line.index.tolist() == [0, 1, 2, 3, 4]
         assert any("ignored" in note for note in line.notes)
+
+
+@given(rate=rates, seed=st.integers(0, 1000), lost=st.integers(2, 9), at=st.integers(40, 160))
+def test_rows_missing_among_jittered_ones_are_told_by_a_shift_that_stays(
+    rate: float, seed: int, lost: int, at: int
+) -> None:
+    kept = np.delete(np.arange(200 + lost), np.arange(at, at + lost))
+    line = even_grid(jittered(kept, rate, 0.28, seed), None, rate)
+    np.testing.assert_array_equal(line.index, kept)

@@ -45,7 +45,7 @@ FITTED = {"localize", "orient", "fit", "angles", "surface", "check"}
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     return record(
-        tmp_path_factory.mktemp("recording"), simulate(with_bone_lengths(Body.load()), 5, frames=80, markers=24)
+        tmp_path_factory.mktemp("recording"), simulate(with_bone_lengths(Body.load()), 7, frames=80, markers=24)
     )
 
 

@@ -43,7 +43,7 @@ _BETWEEN = {
 """What vertebrae are tied to that belong to neither pelvis, thorax nor skull."""
 _NEAR = 0.02
 """m from a joint, where its bone begins to move as a whole."""
-PATELLA_WITH_SHANK = 0.75
+PATELLA_WITH_SHANK = 0.8
 """The kneecap turns about the thigh by 0.85 of the knee's angle and comes nearer to its axis (the model's splines)."""
 
 

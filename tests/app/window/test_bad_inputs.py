@@ -123,8 +123,11 @@ def test_a_marker_file_that_has_other_markers_than_the_results_speak_of(
     markers = load_markers(session.inputs["marker_file"].path)
     few = tmp_path / "few.csv"
     write_markers_csv(few, Markers(markers.positions[:, :7], markers.rate, markers.labels[:7]))
-    save_session(replace(session, inputs={**session.inputs, "marker_file": InputFile(few)}))
     window = open_window()
+    window.open_path(session.folder)  # where the results were in force once
+    spin(lambda: window.shown.track is not None, "the fit")
+    assert window.table.trigger("session.close")
+    save_session(replace(session, inputs={**session.inputs, "marker_file": InputFile(few)}))
     window.open_path(session.folder)
     spin(lambda: window.shown.markers is not None, "the markers")
     window.bench.selection.select(candidate=1)
