@@ -44,7 +44,20 @@ def solved(free_body: Body, bias_deg: float, seed: int) -> tuple[Problem, State,
     return problem, state, weights, bias[FREE]
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+def _vertices(body: Body, bones: np.ndarray, seed: int) -> np.ndarray:
+    """The vertices that ``simulate`` draws for the same seed and number of markers."""
+    rng = np.random.default_rng(seed)
+    for _ in range(12):
+        rng.uniform(0, 2 * np.pi), rng.uniform(1.5, 4)
+    rng.uniform(0, 6)
+    rng.normal(0, 0.7, body.shape_count)
+    index = np.flatnonzero(body.marker_mask)
+    vertices = rng.choice(index, len(bones), replace=False)
+    assert np.array_equal(body.weights[vertices].argmax(1), bones)
+    return vertices
+
+
+@pytest.mark.parametrize("seed", [1, 3])
 def test_a_bias_that_markers_see_is_found(free_body: Body, seed: int) -> None:
     _, state, _, bias = solved(free_body, 15.0, seed)
     rows = [int(np.flatnonzero(INDEX[name] == FREE)[0]) for name in BIASED]
