@@ -2,7 +2,7 @@
 
     python -m tools.make_weights --motions FOLDER... --minutes 25 --out resources/neural/agnostic.safetensors
 
-A run that was stopped goes on where it was. FOLDER holds motions whose licence allows what is derived from them to be
+``--start`` goes on from weights there are: for a body that was baked anew a quarter of the time does. A run that was stopped goes on where it was. FOLDER holds motions whose licence allows what is derived from them to be
 given on; ``--data`` says on the weights' card what they were.
 """
 
@@ -23,7 +23,7 @@ from markerscope.solver.neural.training.train import TrainSettings
 def main() -> None:
     """Train, write the weights in half precision, and print how good they are."""
     from markerscope.solver.neural.layout_free.agnostic import AgnosticSettings
-    from markerscope.solver.neural.weights import Card, save_weights
+    from markerscope.solver.neural.weights import Card, load_weights, save_weights
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--motions", type=Path, nargs="*", default=[])
@@ -31,16 +31,22 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--clips", type=int, default=PretrainSettings.clips)
     parser.add_argument("--bodies", type=int, default=PretrainSettings.bodies)
+    parser.add_argument("--start", type=Path, help="weights to go on from, instead of chance")
+    parser.add_argument("--rate", type=float, default=1.5e-3, help="of learning, at its height")
     parser.add_argument("--data", nargs="*", default=["made motions of Markerscope (Apache-2.0)"])
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
     clips = load_library(options.motions) if options.motions else ()
     settings = PretrainSettings(seed=options.seed, clips=options.clips, bodies=options.bodies)
-    training = TrainSettings(seconds=60 * options.minutes, seed=options.seed, patience=None, rate=1.5e-3, average=0.998)
-    sizes = AgnosticSettings()
-    found = pretrain(
-        clips, training, settings, sizes, checkpoint=options.out.with_suffix(".checkpoint"), progress=_Lines()
+    training = TrainSettings(
+        seconds=60 * options.minutes, seed=options.seed, patience=None, rate=options.rate, average=0.998
     )
+    sizes = AgnosticSettings()
+    start = None
+    if options.start is not None:
+        start = {name: value.float() for name, value in load_weights(options.start, network=NETWORK)[0].items()}
+    checkpoint = options.out.with_suffix(".checkpoint")
+    found = pretrain(clips, training, settings, sizes, start=start, checkpoint=checkpoint, progress=_Lines())
     card = Card(
         NETWORK,
         {"sizes": asdict(sizes)},

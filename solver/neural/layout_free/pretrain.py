@@ -114,10 +114,16 @@ def pretrain(
     settings: PretrainSettings | None = None,
     sizes: AgnosticSettings | None = None,
     *,
+    start: Params | None = None,
     checkpoint: Path | None = None,
     progress: Progress = silent,
 ) -> Trained:
-    """Train on random layouts and bodies in poses of clips (the last tenth of each is only judged on) and made ones."""
+    """Train on random layouts and bodies in poses of clips (the last tenth of each is only judged on) and made ones.
+
+    Parameters
+    ----------
+    start : parameters to go on from, of a network of the same sizes: after a change of the body, say
+    """
     from markerscope.solver.neural.layout_free.agnostic import Agnostic, AgnosticSettings
     from markerscope.solver.neural.layout_free.agnostic_examples import CLEAN, Spoiling, any_layout
     from markerscope.solver.neural.layout_free.agnostic_layouts import Skin
@@ -142,7 +148,7 @@ def pretrain(
     loss = objective(network, lambda numbers: any_layout(sampler, skin, settings.batch, numbers))
     what = json.dumps([asdict(settings), asdict(network.settings), [clip.name for clip in clips]])
     return train(
-        network.initial(settings.seed),
+        start or network.initial(settings.seed),
         loss,
         judged_on(network, tasks),
         training,
