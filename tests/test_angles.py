@@ -377,7 +377,7 @@ def test_an_overhead_swing_ends_where_it_began(convention: str, side: str) -> No
     found = joint_angles(
         np.arange(len(frames)) / 100,
         at_home(rotations),
-        *square_body(),
+        *square_body(convention),
         AngleSettings(convention=convention),  # type: ignore[arg-type]
     )
     columns = [i for i, name in enumerate(found.names) if name.startswith(("arm", "shoulder")) and name[-1] == side[0]]
@@ -396,7 +396,7 @@ def test_every_reading_lies_within_half_a_turn_of_the_joints_range(convention: s
     rotations = Rotation.from_rotvec(rng.normal(0, 1.2, (24 * 60, 3))).as_matrix().reshape(60, 24, 3, 3)
     order = rng.permutation(60)
     found, other = (
-        joint_angles(np.arange(60.0), r, *square_body(), AngleSettings(convention=convention))  # type: ignore[arg-type]
+        joint_angles(np.arange(60.0), r, *square_body(convention), AngleSettings(convention=convention))  # type: ignore[arg-type]
         for r in (at_home(rotations), at_home(rotations[order]))
     )
     if conventions()[convention]["lab"] == "as recorded":
@@ -433,7 +433,7 @@ def test_jumps_of_the_reading_are_flagged() -> None:
     for name, matrix in STANDING.items():
         rotations[:, INDEX[name]] = matrix
     rotations[:, INDEX["right_shoulder"]] = [turn(x=-3.0 * i) @ HANGING["right_shoulder"] for i in range(120)]
-    found = joint_angles(np.arange(120) / 100, at_home(rotations), *square_body(), AngleSettings())
+    found = joint_angles(np.arange(120) / 100, at_home(rotations), *square_body("opensim"), AngleSettings())
     column = found.names.index("arm_flex_r")
     (frame,) = np.flatnonzero(found.jumps[:, column])
     assert found.degrees[frame - 1, column] > 200 and found.degrees[frame, column] < -100

@@ -214,7 +214,7 @@ def test_a_video_that_is_much_shorter_is_used_for_what_it_shows(shell: Shell) ->
 
 def test_a_video_that_is_too_short_to_find_the_offset(shell: Shell) -> None:
     code, said = shell.run(*seen_for(shell, 1.0, 1.5))
-    assert code == 2 and "share less than 1 s" in said and "give the offset" in said, said
+    assert code == 2 and "1 s of movement are needed" in said and "give the offset" in said, said
     assert not (shell.out / "motion.npz").exists()
 
 

@@ -2,8 +2,9 @@
 
     python -m tools.make_weights --motions FOLDER... --minutes 25 --out resources/neural/agnostic.safetensors
 
-``--start`` goes on from weights there are: for a body that was baked anew a quarter of the time does. A run that was stopped goes on where it was. FOLDER holds motions whose licence allows what is derived from them to be
-given on; ``--data`` says on the weights' card what they were.
+``--start`` goes on from weights there are, as for a body that was baked anew. A run that was stopped goes on where it
+was. FOLDER holds motions whose licence allows what is derived from them to be given on; ``--data`` says on the weights'
+card what they were.
 """
 
 from __future__ import annotations

@@ -10,15 +10,15 @@ from markerscope.widgets.panels.dated import Dated
 
 _MARKERS = ("markers", "clean")
 DRAWN: Mapping[str, tuple[str, ...]] = {
-    "scene": (*_MARKERS, "segment", "localize", "solve", "orient", "fit"),
+    "scene": (*_MARKERS, "segment", "localize", "solve", "orient", "fit", "neutral"),
     "video": (*_MARKERS, "landmarks", "sync", "segment", "fit"),
     "affinity": (*_MARKERS, "segment"),
     "candidates": (*_MARKERS, "localize", "orient"),
-    "hypotheses": (*_MARKERS, "localize", "solve", "orient"),
+    "hypotheses": (*_MARKERS, "localize", "solve", "orient", "check"),
     "convergence": ("localize", "solve", "orient"),
-    "markers": (*_MARKERS, "segment", "fit"),
+    "markers": (*_MARKERS, "segment", "fit", "check"),
     "timelines": (*_MARKERS, "landmarks", "prior", "sync", "segment", "orient", "fit"),
-    "angles": ("fit", "angles"),
+    "angles": ("fit", "neutral", "angles"),
 }
 """The stages whose results each view may draw, by panel. Cards and the history stand apart: they name their states."""
 

@@ -57,8 +57,8 @@ def cook_of(path: Path) -> str | None:
 
 
 def label(raw: str, options: Options) -> str | None:
-    """The marker's name, those on the backpack left out unless they are asked for."""
-    if raw.startswith("*") or (raw in BACKPACK and not options.backpack):
+    """The marker's name; those of objects are left out, and those on the backpack unless they are asked for."""
+    if raw.startswith("*") or ":" in raw or (raw in BACKPACK and not options.backpack):
         return None
     return raw
 

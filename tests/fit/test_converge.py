@@ -27,9 +27,9 @@ FREE_OF_VIDEO = Weights(prior_deg=36.0, root_deg=50.0, image=0.05)
 @pytest.fixture(scope="module")
 def trial(free_body) -> tuple[Scene, State, Surface]:  # type: ignore[no-untyped-def]
     """A scene whose markers sit some 20 mm off where the fit has them, so that the robust kernels bite."""
-    scene = simulate(free_body, 4, frames=40, markers=60)
+    scene = simulate(free_body, 1, frames=40, markers=60)
     skin = Skin(free_body, scene.pose.betas)
-    placement, surface = skin.on_vertices(drawn_vertices(free_body, scene.bones, 4), 0.0095)
+    placement, surface = skin.on_vertices(drawn_vertices(free_body, scene.bones, 1), 0.0095)
     off = np.random.default_rng(4).normal(0, 0.012, placement.rest.shape)
     placement = replace(placement, rest=placement.rest + off)
     prior = scene.seen.prior.copy()

@@ -201,7 +201,7 @@ def test_another_yaw_can_be_pinned(
     assert "pinned" in pinned.warnings[0]
     moved = np.linalg.norm(log_so3(np.swapaxes(pinned.rotations[:, 0], 1, 2) @ stage_4.rotations[:, 0]), axis=1)
     assert np.degrees(np.median(moved)) < 15, "stage 5 begins at the pinned yaw's stage 4"
-    with pytest.raises(InputError, match="pin one of the 4 yaws"):
+    with pytest.raises(InputError, match="pin one of 1 to 4"):
         motion_of(short.body, short.seen, time, found, solved, ranked, PaperFitSettings(candidate=4))
 
 

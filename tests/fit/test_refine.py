@@ -75,7 +75,8 @@ def test_every_frame_is_solved_those_after_the_first_chunk_too(free_body: Body) 
     seen.prior[:, 0] = scene.camera.R_lab_cam.T @ seen.prior[:, 0]
     keyframes = np.arange(0, 140, 20)
     weights = Weights(prior_deg=20.0, anatomical=0.003)
-    found = every_frame(free_body, seen, scene.landmarks, keyframes, at_keyframes(state, keyframes), surface, weights)
+    fitted = at_keyframes(state, keyframes)
+    found = every_frame(free_body, seen, scene.landmarks, keyframes, fitted, surface, weights).pose
     assert len(found.trans) == 140
     where = place_points(state.placement, forward(free_body, found), found.betas)
     off = 1000 * np.linalg.norm(where - seen.markers, axis=2)

@@ -42,8 +42,8 @@ def test_the_size_of_a_cloud_is_that_of_its_usual_frame() -> None:
 
 def test_a_wish_wins_over_the_file_and_only_a_difference_is_said() -> None:
     points = cloud(1.7)
-    assert settle_units(points, "mm", "mm", "a") == (0.001, ())
-    assert settle_units(points, None, "cm", "a") == (0.01, ())
+    assert settle_units(1000 * points, "mm", "mm", "a") == (0.001, ())
+    assert settle_units(100 * points, None, "cm", "a") == (0.01, ())
     factor, notes = settle_units(points, "mm", "m", "a")
     assert factor == 1.0
     assert notes == ("The file says its unit is mm; m was taken as asked.",)

@@ -188,7 +188,7 @@ def test_hands_have_networks_where_fingers_have_markers(body: Body, layout: Layo
     assert groups_of(hands, split=False) == ("body",)
     assert len(members(hands, "body")) == 55 and len(members(hands, "body", split=False)) == 63
     labels = [hands.labels[i] for i in members(hands, "left_hand")]
-    assert len(labels) == 11 and all(label.startswith("left_") for label in labels), labels
+    assert len(labels) == 9 and all(label.startswith("left_") for label in labels), labels
     task = make_task(body, hands, "left_hand", sampler, sampler, Choice(sizes=SMALL, batch=8))
     assert task.joints == JOINTS_OF["left_hand"] == (20, 22)
     local, target = task.given(sampler.draw(hands, 30, generator(0)))

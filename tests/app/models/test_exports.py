@@ -77,7 +77,9 @@ def test_angles_are_written_under_a_name_of_the_users(board: StageBoard, tmp_pat
 def test_stale_results_are_not_exported(board: StageBoard, tmp_path: Path) -> None:
     assert why_not(board) == ""
     board.document.apply(edits.set_value(board.document.session, "fit", "video_share", 0.3))
-    assert why_not(board).startswith("not there under these settings: Fit, Joint angles, Distance to the skin")
+    assert why_not(board).startswith(
+        "not there under these settings: Fit, Neutral pose, Joint angles, Distance to the skin"
+    )
     with pytest.raises(InputError, match="run all stages first"):
         export(board, tmp_path / "out", ["angles"])
     assert not (tmp_path / "out").exists()

@@ -139,14 +139,14 @@ def test_time_left_goes_by_past_runs_and_then_by_this_one(document: Document, mo
     runner.run(["fit", "angles"])
     board = runner.board
     assert runner._work is not None
-    runner._work.expected = {"fit": 20.0, "angles": 10.0}
+    runner._work.expected = {"fit": 20.0, "neutral": 0.0, "angles": 10.0}
     cost = {stage.name: stage.cost for stage in board.graph}
     job.messages = [Event("fit", "running", board.keys["fit"])]
     runner.poll()
     assert runner.at is not None
     assert (runner.at.stage, runner.at.seconds_left, runner.at.stage_left) == ("fit", 30.0, 20.0)
     now[0] = 10.0
-    half = 0.5 * cost["fit"] / (cost["fit"] + cost["angles"])
+    half = 0.5 * cost["fit"] / (cost["fit"] + cost["neutral"] + cost["angles"])
     job.messages = [Progressed(half, "half")]
     runner.poll()
     assert runner.at.part == pytest.approx(0.5)

@@ -211,8 +211,11 @@ def test_a_body_that_is_spoilt_later_is_said_once(
 ) -> None:
     wrong = tmp_path / "body.npz"
     wrong.write_bytes(b"no body")
-    save_session(replace(session, inputs={**session.inputs, "body_file": InputFile(wrong)}))
     window = open_window()
+    window.open_path(session.folder)
+    spin(lambda: window.shown.track is not None, "the fit, which was in force")
+    window.bench.close()
+    save_session(replace(session, inputs={**session.inputs, "body_file": InputFile(wrong)}))
     window.open_path(session.folder)
     spin(lambda: window.bench.clock.timing.frames > 0, "the markers")
     for _ in range(8):
