@@ -183,6 +183,14 @@ def test_residual_rows_say_when_a_marker_was_worst() -> None:
     assert rows[0].lost == pytest.approx(1 / 3)
 
 
+def test_the_table_says_where_markers_were_drawn_only_if_any_was() -> None:
+    residual = np.full((3, 2), 0.01)
+    around = (("a", "b"), ("x", "y"), ("p", "q"), residual, np.isfinite(residual), np.arange(3.0))
+    drawn = render(replace(full(), residuals=marker_residuals(*around, ("left asis, 96 %, 34 to 7 mm", ""))))
+    assert "left asis, 96 %, 34 to 7 mm" in drawn and "on the landmark" in drawn
+    assert "on the landmark" not in render(replace(full(), residuals=marker_residuals(*around)))
+
+
 def test_figures() -> None:
     assert figure(float("nan")) == "–" and figure(1234.56) == "1\u202f234.6" and figure(0.5, 0) == "0"
 

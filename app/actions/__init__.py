@@ -5,6 +5,7 @@ from __future__ import annotations
 from markerscope.app.actions.action import MENUS, Action, Actions, Asks
 from markerscope.app.actions.clean_actions import CLEAN_ACTIONS
 from markerscope.app.actions.edit_actions import EDIT_ACTIONS
+from markerscope.app.actions.landmark_actions import LANDMARK_ACTIONS
 from markerscope.app.actions.neutral_actions import NEUTRAL_ACTIONS
 from markerscope.app.actions.play_actions import PLAY_ACTIONS
 from markerscope.app.actions.run_actions import RUN_ACTIONS
@@ -14,6 +15,7 @@ from markerscope.app.actions.view_actions import VIEW_ACTIONS
 ACTIONS = (
     *SESSION_ACTIONS,
     *EDIT_ACTIONS,
+    *LANDMARK_ACTIONS,
     *CLEAN_ACTIONS,
     *NEUTRAL_ACTIONS,
     *VIEW_ACTIONS,

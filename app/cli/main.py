@@ -33,7 +33,7 @@ from markerscope.app.cli.train import train_options
 from markerscope.solver import __version__
 from markerscope.solver.bench.request import OUT, names
 from markerscope.solver.core.plain import shown
-from markerscope.solver.core.request import Convention, Method, Units, Up, parse_neutral, parse_range
+from markerscope.solver.core.request import Convention, LandmarkPull, Method, Units, Up, parse_neutral, parse_range
 
 COMMANDS = {
     "demo": "solve the embedded session and say how close it came to the known truth",
@@ -168,6 +168,12 @@ def _solve_options(solve: argparse.ArgumentParser) -> None:
     )
     how.add_argument("--weights", type=Path, metavar="FILE", help="of the network, instead of those that ship (neural)")
     how.add_argument("--iterations", type=int, metavar="N", help="of each optimisation at most (method paper)")
+    how.add_argument(
+        "--landmark-pull",
+        choices=get_args(LandmarkPull),
+        help="draw markers to the bony landmarks that they were put on: earned (default: where their places say so) "
+        "or off",
+    )
     how.add_argument("--convention", choices=get_args(Convention), help="names and signs of the angles")
     how.add_argument(
         "--neutral",
@@ -179,7 +185,9 @@ def _solve_options(solve: argparse.ArgumentParser) -> None:
 
 
 def _bench_options(bench: argparse.ArgumentParser) -> None:
-    bench.add_argument("suite", metavar="SUITE", help="accuracy, parts, scaling, ablation, short, clean or neural")
+    bench.add_argument(
+        "suite", metavar="SUITE", help="accuracy, parts, layouts, scaling, ablation, short, clean or neural"
+    )
     bench.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="tables and records (default: %(default)s)")
 
     what = bench.add_argument_group("what is run")

@@ -16,7 +16,8 @@ _GROUPS: dict[str, tuple[tuple[str, Callable[[str], Any], str, str], ...]] = {
     "the markers": (
         ("markers", int, "N", "how many, where they are spread at random (default: 40)"),
         ("part", str, "NAME", "the part of the body that alone has markers: left_arm, right_leg... (default: all)"),
-        ("layout", str, "NAME", "uniform, or named places: full_body, left_arm... (default: uniform)"),
+        ("layout", str, "NAME", "uniform, or named places: full_body, plug_in_gait, left_arm... (default: uniform)"),
+        ("misplaced_mm", float, "MM", "how far from its named place each marker sits (default: 0)"),
         ("apart_mm", float, "MM", "least distance of two markers (default: 30)"),
         ("offset_mm", float, "MM", "height above the skin (default: 9.5)"),
         ("offset_spread_mm", float, "MM", "its spread from marker to marker (default: 1.5)"),

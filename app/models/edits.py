@@ -26,7 +26,7 @@ DECISIONS = {
     "sync": ("offset", "rate_ratio"),
     "segment": ("threshold", "groups", "merges", "splits", "moves", "left_out"),
     "localize": ("part_of_cloud",),
-    "fit": ("candidate",),
+    "fit": ("candidate", "pinned", "refused"),
     "neutral": ("start", "stop"),
 }
 """Settings that are decided for one recording."""

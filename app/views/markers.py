@@ -29,6 +29,9 @@ class MarkerTable:
     mean, p95, worst : mm, distance from where the body puts it; NaN where it was not used
     worst_frame : frame of the worst, -1 without any
     worst_time : s, marker clock
+    landmark : bony landmark that it was drawn to, "" for none
+    probability : per cent that it sits there, NaN where there is none
+    beside : mm from there, NaN where there is none
     """
 
     labels: tuple[str, ...]
@@ -42,6 +45,9 @@ class MarkerTable:
     worst: np.ndarray
     worst_frame: np.ndarray
     worst_time: np.ndarray
+    landmark: tuple[str, ...]
+    probability: np.ndarray
+    beside: np.ndarray
 
 
 def marker_table(
@@ -56,6 +62,9 @@ def marker_table(
     gaps, longest = gap_lengths(~measured)
     nothing = np.full(width, -1)
     joints = nothing if motion is None else motion.marker_joint
+    drawn = None if motion is None else motion.pull
+    named = ("",) * width if drawn is None else drawn.landmark
+    chance, beside = (np.full(width, np.nan),) * 2 if drawn is None else (100 * drawn.probability, 1000 * drawn.after)
     mean, p95, worst, frame = _residuals(np.full((1, width), np.nan) if motion is None else motion.residual)
     return MarkerTable(
         labels=tracks.markers.labels,
@@ -69,6 +78,9 @@ def marker_table(
         worst=worst,
         worst_frame=frame,
         worst_time=np.where(frame < 0, np.nan, tracks.markers.first_time + frame / tracks.markers.rate),
+        landmark=tuple(name.replace("_", " ") for name in named),
+        probability=np.where([bool(name) for name in named], chance, np.nan),
+        beside=beside,
     )
 
 

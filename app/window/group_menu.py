@@ -21,6 +21,10 @@ from markerscope.widgets.plots.affinity_menu import edit_menu
 from markerscope.widgets.scene import Scene3D
 
 _CLICK_PX = 4
+_OFFERED = (
+    "landmark.pin", "landmark.refuse", "landmark.release",
+    "select.groups", "select.invert", "select.none", "camera.selected", "camera.fit", "tool.select",
+)  # fmt: skip
 
 
 class GroupEdits:
@@ -84,7 +88,7 @@ class SceneMenu(QObject):
         else:
             menu = QMenu(self.scene)
         menu.setToolTipsVisible(True)
-        for name in ("select.groups", "select.invert", "select.none", "camera.selected", "camera.fit", "tool.select"):
+        for name in _OFFERED:
             action = self.table.table[name]
             made = menu.addAction(f"{action.title}\t{native(action)}", partial(self.table.trigger, name))
             reason, on = self.table.why_not(name), self.table.is_on(name)

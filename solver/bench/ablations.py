@@ -17,7 +17,7 @@ from markerscope.solver.core.progress import Progress, silent
 from markerscope.solver.fit.published.results import BodyState
 from markerscope.solver.fit.published.settings import PaperLocalizeSettings, PaperSolveSettings
 from markerscope.solver.fit.results import FittedMotion
-from markerscope.solver.fit.settings import LocalizeSettings, OrientSettings
+from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
 from markerscope.solver.fit.state import Observations, Weights
 
 _OFFSET = 0.0095
@@ -142,6 +142,12 @@ def ablations() -> tuple[Variant, ...]:
             "the default method without solving where on the skin a marker sits",
             bundle,
             {"orient": HeldPlacement()},
+        ),
+        Variant(
+            "bundle-without-landmarks",
+            "the default method without the pull to bony landmarks",
+            bundle,
+            {"fit": FitSettings(landmark_pull="off")},
         ),
         Variant("bundle-unfitted", "the default method's cheapest hypothesis before any adjustment", unfitted),
         Variant(

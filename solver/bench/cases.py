@@ -79,6 +79,23 @@ def parts(frames: int, gaps: Path | None) -> tuple[Case, ...]:
     )
 
 
+def layouts(frames: int, gaps: Path | None) -> tuple[Case, ...]:
+    """Places where laboratories put markers, hit by hands that miss them, beside places that mean nothing."""
+    named = {"plug-in-gait": "plug_in_gait", "ior": "ior", "cast": "cast", "full-body": "full_body"}
+    return (
+        Case("40-anywhere", usual(frames), "forty markers anywhere: nothing to be drawn to"),
+        *(
+            Case(
+                f"{name}-{by}-mm",
+                replace(usual(frames), layout=layout, misplaced_mm=float(by)),  # type: ignore[arg-type]
+                f"the layout {name}, each marker {by} mm beside its place",
+            )
+            for name, layout in named.items()
+            for by in (5, 10, 20, 30)
+        ),
+    )
+
+
 def scaling(frames: int, gaps: Path | None) -> tuple[Case, ...]:
     """Time and memory against frames, and against markers."""
     long = tuple(Case(f"{count}-frames", usual(count), "40 markers") for count in (frames, 10 * frames, 100 * frames))
@@ -106,6 +123,7 @@ def short(frames: int, gaps: Path | None) -> tuple[Case, ...]:
 SUITES: dict[str, Callable[[int, Path | None], tuple[Case, ...]]] = {
     "accuracy": accuracy,
     "parts": parts,
+    "layouts": layouts,
     "scaling": scaling,
     "ablation": ablation,
     "short": short,

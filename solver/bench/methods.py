@@ -27,8 +27,8 @@ from markerscope.solver.pipeline.methods import GRAPHS
 
 _UNSURE = 0.5
 """Below this confidence in the offset a solve asks its user for it."""
-SHARED_CODE = ("core", "body", "cleaning", "sync", "clustering", "fit/*.py", "pipeline/fitting.py",
-           "pipeline/stages.py", "pipeline/inputs.py", "pipeline/cleaning.py")  # fmt: skip
+SHARED_CODE = ("core", "body", "cleaning", "sync", "clustering", "fit/*.py", "solve/pull",
+           "pipeline/fitting.py", "pipeline/stages.py", "pipeline/inputs.py", "pipeline/cleaning.py")  # fmt: skip
 NEURAL_CODE = (*SHARED_CODE, "neural", "pipeline/stages_neural.py")
 PAPER_CODE = (*SHARED_CODE, "fit/published", "pipeline/stages_paper.py")
 

@@ -16,6 +16,7 @@ from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.progress import Progress, part_of, silent
 from markerscope.solver.core.request import Method, SolveOutcome, SolveRequest
 from markerscope.solver.fit.doubts.doubt import Doubt
+from markerscope.solver.fit.pull.results import summary as summary_of_pull
 from markerscope.solver.fit.results import Candidate
 from markerscope.solver.io.camera import camera_file
 from markerscope.solver.io.output_folder import remove_if_empty
@@ -155,7 +156,8 @@ def _with_options(session: Session, request: SolveRequest) -> Session:
     """The request's options over the session's settings, and over its edits: what is said last counts."""
     session = with_method(session, request.method or session.run.method)
     settings, edits = dict(session.settings), dict(session.edits)
-    for stage, said in {**_said(request), **_capped(request, session.run.method)}.items():
+    options = {**_said(request), **_capped(request, session.run.method), **_drawn(request, session.run.method)}
+    for stage, said in options.items():
         settings[stage] = overlay(settings.get(stage, {}), said)
         edits[stage] = without(edits.get(stage, {}), {*said, *said.get(UNSET, ())})
     return replace(
@@ -204,6 +206,16 @@ def _capped(request: SolveRequest, method: Method) -> dict[str, dict[str, Any]]:
     return {name: {"iterations": request.iterations} for name in capped}
 
 
+def _drawn(request: SolveRequest, method: Method) -> dict[str, dict[str, Any]]:
+    """Whether markers are drawn to bony landmarks, where the method can."""
+    if request.landmark_pull is None:
+        return {}
+    fit = next(stage for stage in GRAPHS[method] if stage.name == "fit")
+    if not hasattr(fit.settings, "landmark_pull"):
+        raise InputError(f"method {method} draws no markers to landmarks", "--landmark-pull", "leave it out")
+    return {"fit": {"landmark_pull": request.landmark_pull}}
+
+
 def _save(session: Session) -> None:
     """Save the session, unless its file says the same already."""
     if session_folder(session.folder) is None or load_session(session.folder) != session:
@@ -250,6 +262,7 @@ def _outcome(session: Session, graph: GraphRun, not_kept: tuple[str, ...] = ()) 
         "doubts": [_doubt(doubt, markers.labels) for doubt in found.doubts],
         "nobodys_markers": [markers.labels[m] for m in found.nobody],
         "suspect_markers": [markers.labels[m] for m in found.suspect],
+        "landmark_pull": None if motion.pull is None else summary_of_pull(motion.pull, markers.labels),
     }
     said, doubted = (*assumptions(graph), *not_kept), doubts(graph)
     lines = (

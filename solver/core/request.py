@@ -18,6 +18,7 @@ Method = Literal["bundle", "paper", "neural"]
 RECORDED = "recorded"
 """What ``--neutral`` takes for the convention's own zero."""
 _SPAN = re.compile(r"[-+.\deE]*:[-+.\deE]*")
+LandmarkPull = Literal["earned", "off"]
 Convention = Literal["opensim", "isb", "gait2392", "visual3d", "plugin-gait"]
 
 
@@ -47,6 +48,7 @@ class SolveRequest:
     convention : names and signs of the angles
     neutral : what the angles are counted from: a span (start, stop) s of the trial, either may be None, the file of a
         static trial of the same person, or "recorded" for the convention's own zero
+    landmark_pull : whether markers are drawn to bony landmarks where their layout has earned it
     """
 
     markers: Path
@@ -69,10 +71,14 @@ class SolveRequest:
     weights: Path | None = None
     convention: Convention | None = None
     neutral: tuple[float | None, float | None] | Path | Literal["recorded"] | None = None
+    landmark_pull: LandmarkPull | None = None
 
     def __post_init__(self) -> None:
         """Refuse values that no data can make sense of."""
-        for name, literal in (("up", Up), ("units", Units), ("method", Method), ("convention", Convention)):
+        choices_of = {
+            "up": Up, "units": Units, "method": Method, "convention": Convention, "landmark_pull": LandmarkPull,
+        }  # fmt: skip
+        for name, literal in choices_of.items():
             value, choices = getattr(self, name), typing.get_args(literal)
             if value is not None and value not in choices:
                 raise InputError(f'"{value}" is not known', option(name), f"use {' or '.join(choices)}")

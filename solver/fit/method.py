@@ -24,6 +24,7 @@ from markerscope.solver.fit.kinematics import Points, Pose, forward, place_point
 from markerscope.solver.fit.localize import Hypothesis, Search, hypotheses
 from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.problem import Problem
+from markerscope.solver.fit.pull.stage import to_landmarks
 from markerscope.solver.fit.refine import every_frame
 from markerscope.solver.fit.results import Candidate, FittedMotion, Localization, Orientation, Steps
 from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
@@ -239,8 +240,15 @@ def fit(
     used = in_use(seen, found, ranked)
     frames = found.many if chosen.refined else found.few
     state, surface, weights = _settled(body, used.at(frames), landmarks, chosen, settings)
-    pose = every_frame(body, used, landmarks, frames, state, surface, weights, progress)
-    return fitted_motion(body, seen, found, ranked, settings, state, pose, time)
+    # Nobody's markers draw nothing: they count as lost, and as kept from every landmark.
+    theirs = [int(m) for m in ranked.far]
+    own = replace(settings, refused=(*settings.refused, *((m, "") for m in theirs)))
+    lost = np.isin(np.arange(seen.markers.shape[1]), theirs)[:, None]
+    kept = replace(seen, markers=np.where(lost, np.nan, seen.markers))
+    drawn = to_landmarks(body, kept, landmarks, found.markers, frames, state, surface, weights, own)
+    pose = every_frame(body, used, landmarks, frames, drawn.state, drawn.surface, weights, progress)
+    motion = fitted_motion(body, seen, found, ranked, settings, drawn.state, pose, time)
+    return replace(motion, pull=drawn.pull)
 
 
 def in_use(seen: Observations, found: Localization, ranked: Orientation) -> Observations:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.fit.pull.results import LandmarkPull
 from markerscope.solver.fit.state import no_bias
 
 
@@ -160,6 +161,7 @@ class FittedMotion:
     settled_deg : degrees, a further step would turn no joint of a settled frame by more; NaN where it was not iterated
         so
     settled : (T,) True where the frame's iteration came to that, None where it was not iterated so
+    pull : which markers were drawn to which bony landmarks; None where the method knows no such thing
     """
 
     time: np.ndarray
@@ -177,3 +179,4 @@ class FittedMotion:
     warnings: tuple[str, ...]
     settled_deg: float = np.nan
     settled: np.ndarray | None = None
+    pull: LandmarkPull | None = None

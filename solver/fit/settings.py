@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from markerscope.solver.core.errors import InputError
+from markerscope.solver.fit.pull.by_hand import Pair, check_pairs
 from markerscope.solver.fit.state import Weights
 
 
@@ -96,14 +98,21 @@ class FitSettings:
     candidate : row of the orientation's candidates to use, pinned by hand; None takes the first
     video_share : how much less the video counts than while the markers were being placed: its errors are the same
         frame after frame, so once the markers have their places it only holds what they do not see
+    landmark_pull : draw markers to palpable bony landmarks where the layout has ``earned`` it, or ``off``
+    pinned : markers by column that sit on a bony landmark, by hand
+    refused : pairs that are not to be, by hand; the landmark "" stands for all of them
     """
 
     candidate: int | None = None
     video_share: float = 0.25
+    landmark_pull: Literal["earned", "off"] = "earned"
+    pinned: tuple[Pair, ...] = ()
+    refused: tuple[Pair, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what cannot work."""
         _positive(self, "video_share")
+        check_pairs(self.pinned, self.refused)
 
     def weights(self) -> Weights:
         """The same as weights of the fit."""

@@ -14,6 +14,7 @@ from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.prior import PosePrior
 from markerscope.solver.fit.doubts.rules import Verdict
 from markerscope.solver.fit.known.neutral import Neutral, NeutralSettings
+from markerscope.solver.fit.pull.results import said as said_pull
 from markerscope.solver.fit.results import FittedMotion, Localization, Orientation
 from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
 from markerscope.solver.fit.surface import SurfaceDistance
@@ -66,10 +67,10 @@ def said_fit(motion: FittedMotion) -> str:
     """How near the markers are."""
     residual = 1000 * np.nanmedian(motion.residual)
     said = f"{len(motion.time)} frames, markers {residual:.1f} mm from their places (median)"
-    if motion.settled is None:
-        return said
-    which = "all" if motion.settled.all() else f"{motion.settled.sum()} of them"
-    return f"{said}, {which} iterated to {motion.settled_deg:g} degrees"
+    if motion.settled is not None:
+        which = "all" if motion.settled.all() else f"{motion.settled.sum()} of them"
+        said = f"{said}, {which} iterated to {motion.settled_deg:g} degrees"
+    return said if motion.pull is None else f"{said}; {said_pull(motion.pull)}"
 
 
 def _said_surface(found: SurfaceDistance) -> str:
@@ -152,7 +153,7 @@ GRAPH = (
     ),
     Stage(
         "fit",
-        4,
+        5,
         FitSettings,
         (*FITTED_TO, "localize", "orient"),
         fitting.fit_every_frame,

@@ -77,7 +77,9 @@ def _poses(given: Mapping[str, Any], settings: NetworkSettings, row: int, progre
     network = pose_network(given["weights_file"], body, marked(body, chosen), chosen.vertex)
     if settings.tune_steps:
         network = network.tuned(settings.tune_steps, part_of(progress, 0.0, 0.8))
-    usual = fit(body, seen, landmarks, found, ranked, cleaned.time, FitSettings(row), part_of(progress, 0.8, 0.9))
+    # The network is told where the candidate has the markers, so the fit beside it leaves them there.
+    settled = FitSettings(row, landmark_pull="off")
+    usual = fit(body, seen, landmarks, found, ranked, cleaned.time, settled, part_of(progress, 0.8, 0.9))
     markers = in_use(seen, found, ranked).markers
     solved = network.poses(markers, cleaned.rate, part_of(progress, 0.9, 1.0))
     blend = blended(solved.rotations, usual.rotations, network.expected_errors(), settings.default_deg)

@@ -116,6 +116,7 @@ class MarkerResidual:
     mean_mm, worst_mm : distance from where the body puts it; NaN if it was not used
     worst_time : s, when it was worst
     lost : share of the frames in which it was lost, 0..1
+    landmark : the bony landmark that it was drawn to, with its probability and distance in mm, in words; "" for none
     """
 
     name: str
@@ -125,6 +126,7 @@ class MarkerResidual:
     worst_mm: float
     worst_time: float
     lost: float
+    landmark: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,14 +211,17 @@ def marker_residuals(
     residual: np.ndarray,
     present: np.ndarray,
     time: np.ndarray,
+    landmarks: tuple[str, ...] | None = None,
 ) -> tuple[MarkerResidual, ...]:
     """One row per marker from the residuals (T, M) m, presence (T, M) and clock (T,) s; the worst mean first."""
     rows = []
+    drawn = landmarks or ("",) * len(names)
     for m, (name, label, bone) in enumerate(zip(names, labels, bones, strict=True)):
         known = np.isfinite(residual[:, m])
         mean = worst = when = float("nan")
         if known.any():
             frame = int(np.nanargmax(residual[:, m]))
             mean, worst, when = float(residual[known, m].mean()), float(residual[frame, m]), float(time[frame])
-        rows.append(MarkerResidual(name, label, bone, mean * 1000, worst * 1000, when, float(1 - present[:, m].mean())))
+        lost = float(1 - present[:, m].mean())
+        rows.append(MarkerResidual(name, label, bone, mean * 1000, worst * 1000, when, lost, drawn[m]))
     return tuple(sorted(rows, key=lambda row: -np.nan_to_num(row.mean_mm, nan=np.inf)))

@@ -14,6 +14,7 @@ from markerscope.solver.clustering.segment import Segmentation
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.skeleton import BONES, JOINTS
+from markerscope.solver.fit.pull.results import EARNED, LandmarkPull, words_of
 from markerscope.solver.fit.results import FittedMotion, Orientation
 from markerscope.solver.pipeline.cleaning import measured
 from markerscope.solver.pipeline.doubts import doubts
@@ -92,7 +93,15 @@ def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str,
         margin=ranked.margin,
         angles=_curves(graph["angles"]),
         zero_pose=graph["angles"].zero_pose,
-        residuals=marker_residuals(named.labels, markers.labels, bones, motion.residual, markers.present, motion.time),
+        residuals=marker_residuals(
+            named.labels,
+            markers.labels,
+            bones,
+            motion.residual,
+            markers.present,
+            motion.time,
+            None if motion.pull is None else words_of(motion.pull),
+        ),
         gaps=Gaps(named.labels, motion.time, markers.present, filled),
         stages=stages,
         versions=_versions(about),
@@ -115,7 +124,17 @@ def _headlines(graph: GraphRun, motion: FittedMotion, ranked: Orientation) -> tu
         rows.append(
             Headline("Reprojection", f"{camera.reprojection_px:.0f} px", "median distance of the video's landmarks")
         )
+    if motion.pull is not None:
+        rows.append(_landmarks(motion.pull))
     return tuple(rows)
+
+
+def _landmarks(pull: LandmarkPull) -> Headline:
+    value = f"{pull.hits} markers" if pull.state in ("earned", "by hand") else pull.state
+    note = "drawn to the landmarks that they sit on"
+    if np.isfinite(pull.log_ratio):
+        note += f"; log likelihood ratio {pull.log_ratio:.1f}, needs {EARNED:.1f}"
+    return Headline("Bony landmarks", value, note)
 
 
 def _groups(markers: Markers, found: Segmentation) -> Groups:

@@ -16,6 +16,14 @@ _PELVIS = ("left_asis", "right_asis", "left_psis", "right_psis")
 _ARM = ("upper_arm", "elbow_lateral", "elbow_medial", "forearm", "wrist_radius", "wrist_ulna", "hand_meta3")
 _LEG = ("thigh", "knee_lateral", "knee_medial", "shank", "ankle_lateral", "ankle_medial", "calcaneus", "meta1", "meta5")
 
+_TRUNK_IOR = ("c7", "t8", "sternum_ij", "sternum_px", "left_acromion", "right_acromion")
+_ARM_PIG = ("acromion", "upper_arm", "elbow_lateral", "forearm", "wrist_radius", "wrist_ulna", "hand_meta2")
+_LEG_PIG = ("thigh", "knee_lateral", "shank", "ankle_lateral", "calcaneus", "forefoot")
+_LEG_IOR = ("trochanter", "knee_lateral", "fibula_head", "tibial_tuberosity", "ankle_lateral", "calcaneus", "meta1",
+            "meta5")  # fmt: skip
+_LEG_CAST = ("thigh_high", "thigh", "thigh_front", "thigh_low", "shank_high", "shank", "shin", "shank_low",
+             "calcaneus", "meta1", "meta5")  # fmt: skip
+
 
 def _sided(side: str, names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(f"{side}_{name}" for name in names)
@@ -28,6 +36,14 @@ LAYOUTS: dict[str, tuple[str, ...]] = {
         *_PELVIS,
         *(place for side in ("left", "right") for place in _sided(side, ("acromion", *_ARM, *_LEG))),
     ),
+    "plug_in_gait": (
+        *_HEAD,
+        *_TRUNK,
+        *_PELVIS,
+        *(place for side in ("left", "right") for place in _sided(side, (*_ARM_PIG, *_LEG_PIG))),
+    ),
+    "ior": (*_TRUNK_IOR, *_PELVIS, *_sided("left", _LEG_IOR), *_sided("right", _LEG_IOR)),
+    "cast": (*_PELVIS, *_sided("left", _LEG_CAST), *_sided("right", _LEG_CAST)),
     **{f"{side}_arm": _sided(side, (*_ARM, "triceps", "forearm_back", "thumb_side")) for side in ("left", "right")},
     **{f"{side}_leg": _sided(side, (*_LEG, "thigh_front", "shin", "hallux")) for side in ("left", "right")},
     **{
@@ -39,7 +55,12 @@ LAYOUTS: dict[str, tuple[str, ...]] = {
         for side in ("left", "right")
     },
 }
-"""Places of each layout: landmarks of the body, or places of the table below."""
+"""Places of each layout: landmarks of the body, or places of the table below.
+
+``plug_in_gait`` is the conventional gait model's whole body (Kadaba et al. 1990, Davis et al. 1991), with T8 for T10;
+``ior`` the lower limbs of Leardini et al. (2007) and a trunk; ``cast`` clusters on thigh and shank as Cappozzo et al.
+(1995) have them, with no marker on an epicondyle or a malleolus.
+"""
 
 _OUT, _FRONT, _BACK, _UP = (1.0, 0, 0), (0, 0, 1.0), (0, 0, -1.0), (0, 1.0, 0)
 _BESIDE: dict[str, tuple[str, str, float, tuple[float, float, float]]] = {
@@ -50,7 +71,13 @@ _BESIDE: dict[str, tuple[str, str, float, tuple[float, float, float]]] = {
     "thumb_side": ("wrist", "hand", 0.6, (0, 0.5, 1.0)),
     "thigh": ("hip", "knee", 0.6, (1.0, 0, 0.2)),
     "thigh_front": ("hip", "knee", 0.45, _FRONT),
+    "trochanter": ("hip", "knee", 0.05, _OUT),
+    "thigh_high": ("hip", "knee", 0.35, _OUT),
+    "thigh_low": ("hip", "knee", 0.75, _OUT),
     "shank": ("knee", "ankle", 0.5, (1.0, 0, 0.2)),
+    "shank_high": ("knee", "ankle", 0.25, _OUT),
+    "shank_low": ("knee", "ankle", 0.75, _OUT),
+    "forefoot": ("foot", "foot", 0.0, _UP),
     "shin": ("knee", "ankle", 0.4, (0.2, 0, 1.0)),
     "hallux": ("foot", "foot", 0.0, (-0.3, 0.1, 1.0)),
     "clavicle": ("collar", "shoulder", 0.4, (0, 0.6, 0.8)),

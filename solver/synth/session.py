@@ -18,6 +18,7 @@ from markerscope.solver.synth.capture import sliding
 from markerscope.solver.synth.gaps import gaps_like, heavy_tailed_gaps, hidden_by_chance
 from markerscope.solver.synth.ghosts import ghosts
 from markerscope.solver.synth.layouts import named_sites
+from markerscope.solver.synth.misplaced import misplaced
 from markerscope.solver.synth.motion import Motion, carried_over, damped, on_floor, played
 from markerscope.solver.synth.prior import PriorError, corrupt_prior, other_shape
 from markerscope.solver.synth.retarget import retarget
@@ -134,6 +135,8 @@ def _sites(body: Body, betas: np.ndarray, settings: SynthSettings, seed: int) ->
     """All places that are drawn, in the order in which they are used, and how many of them are."""
     if settings.layout != "uniform":
         sites = named_sites(body, betas, settings.layout, settings.part)
+        if settings.misplaced_mm:
+            sites = misplaced(body, betas, sites, 1e-3 * settings.misplaced_mm, stream(seed, "misplaced"))
         kept = len(sites)
     else:
         kept = settings.markers

@@ -13,6 +13,9 @@ from markerscope.solver.core.skeleton import PARTS
 Layout = Literal[
     "uniform",
     "full_body",
+    "plug_in_gait",
+    "ior",
+    "cast",
     "left_arm",
     "left_leg",
     "left_shoulder",
@@ -37,6 +40,7 @@ class SynthSettings:
     layout : ``uniform`` spreads them at random, equally over the skin's area; any other name is a set of places as
         laboratories use them, whatever ``markers`` says
     nested : fewer markers are a subset of more; else every number of markers has places of its own
+    misplaced_mm : mm along the skin from its place to where each marker of a named layout sits, in any direction
     apart_mm : mm, least distance of two markers that are spread at random
     shape : whether the program's own shape coefficients and bone lengths can reach the body (``inside``) or not
     spread : standard deviation of each shape coefficient
@@ -68,6 +72,7 @@ class SynthSettings:
     part: str | None = None
     layout: Layout = "uniform"
     nested: bool = True
+    misplaced_mm: float = 0.0
     apart_mm: float = 30.0
     shape: Shape = "outside"
     spread: float = 0.8
@@ -107,7 +112,7 @@ class SynthSettings:
             if not (math.isfinite(value) and least <= value <= most):
                 limits = f"at least {least:g}" if most == _MOST else f"from {least:g} to {most:g}"
                 raise InputError(f"{value:g} is not possible", option(field.name), f"give a number {limits}")
-        if self.part is not None and self.layout not in ("uniform", "full_body", self.part):
+        if self.part is not None and self.layout not in (*_WHOLE, self.part):
             raise InputError(
                 f'the layout "{self.layout}" is not on the {self.part.replace("_", " ")}',
                 option("part"),
@@ -115,11 +120,14 @@ class SynthSettings:
             )
 
 
+_WHOLE = ("uniform", "full_body", "plug_in_gait", "ior", "cast")
+"""Layouts that are on no one part of the body."""
 _MOST = 1e6
 _RANGE: dict[str, tuple[float, float]] = {
     "frames": (2, _MOST),
     "rate": (1, 10_000),
     "markers": (3, 1000),
+    "misplaced_mm": (0, 100),
     "apart_mm": (0, 200),
     "spread": (0, 5),
     "bones": (0, 0.2),

@@ -174,6 +174,26 @@ def test_a_result_that_is_gone_or_damaged_is_computed_again(mine: Path) -> None:
     assert computed(SolveRequest(mine)) == {"surface"}, "what was made of it is there"
 
 
+def test_the_pull_to_landmarks_is_told_of_turned_off_and_decided_by_hand(mine: Path) -> None:
+    told = solve_session(SolveRequest(mine), silent).summary["landmark_pull"]
+    assert told["state"] in ("earned", "not earned", "given up") and np.isfinite(told["log_ratio"])
+    off = solve_session(SolveRequest(mine, landmark_pull="off"), silent).summary
+    assert off["landmark_pull"]["state"] == "off" and off["landmark_pull"]["markers"] == []
+    assert "fit" in off["computed"] and "orient" not in off["computed"]
+    assert computed(SolveRequest(mine, landmark_pull="earned")) == set()
+    pinned = solve_session(edited(mine, {"fit": {"pinned": [[2, "left_asis"]]}}), silent).summary["landmark_pull"]
+    assert {"marker": 2, "landmark": "left_asis", "probability": 1.0}.items() <= {
+        key: value for row in pinned["markers"] if row["marker"] == 2 for key, value in row.items()
+    }.items()
+    with pytest.raises(InputError, match="there is no landmark"):
+        solve_session(edited(mine, {"fit": {"pinned": [[2, "funny_bone"]]}}), silent)
+
+
+def test_a_method_that_draws_no_markers_says_so(mine: Path) -> None:
+    with pytest.raises(InputError, match="method paper draws no markers to landmarks"):
+        solve_session(SolveRequest(mine, method="paper", landmark_pull="off"), silent)
+
+
 def test_a_pinned_candidate_is_used_and_can_be_let_go(mine: Path) -> None:
     first = content(mine)
     outcome = solve_session(edited(mine, {"fit": {"candidate": 1}}), silent)

@@ -11,6 +11,7 @@ from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.skeleton import INDEX, JOINTS, PARTS
 from markerscope.solver.synth import demo_motion, vary_body
 from markerscope.solver.synth.layouts import LAYOUTS, named_sites
+from markerscope.solver.synth.misplaced import misplaced
 from markerscope.solver.synth.sites import markable, site_paths, uniform_sites
 
 FLAT = np.zeros(10)
@@ -123,7 +124,7 @@ def test_named_layouts_are_on_both_sides_alike_or_on_their_part_alone(body: Body
     if layout in PARTS:
         assert {JOINTS[j] for j in sites.joint} == set(PARTS[layout])
         return
-    assert 40 <= len(sites) <= 47
+    assert 26 <= len(sites) <= 47
     of = dict(zip(LAYOUTS[layout], places, strict=True))
     for name, place in of.items():
         if name.startswith("left_"):
@@ -147,3 +148,16 @@ def test_named_places_are_where_their_names_say(body: Body) -> None:
 def test_a_part_of_a_named_layout_is_what_lies_on_its_bones(body: Body) -> None:
     sites = named_sites(body, FLAT, "full_body", "right_leg")
     assert {JOINTS[j] for j in sites.joint} <= set(PARTS["right_leg"]) and len(sites) == 9
+
+
+def test_misplaced_markers_are_as_far_from_their_places_as_was_asked(body: Body) -> None:
+    sites = named_sites(body, FLAT, "full_body")
+    before = np.einsum("mk,mka->ma", sites.shares, body.template[sites.corners])
+    for by in (0.005, 0.02):
+        moved = misplaced(body, FLAT, sites, by, np.random.default_rng(0))
+        after = np.einsum("mk,mka->ma", moved.shares, body.template[moved.corners])
+        off = np.linalg.norm(after - before, axis=1)
+        assert np.median(off) == pytest.approx(by, rel=0.05) and off.max() < 1.3 * by
+        assert body.marker_mask[moved.corners].all()
+    away = after - before
+    assert np.abs((away / np.linalg.norm(away, axis=1, keepdims=True)).mean(axis=0)).max() < 0.35

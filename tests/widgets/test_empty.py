@@ -99,7 +99,7 @@ def test_plots(qapp: QApplication) -> None:
 
 def test_lists(qapp: QApplication) -> None:
     markers, candidates = MarkerTable(), CandidateTable()
-    markers.set_rows(MarkerRows([], NONE, NONE, NONE, NONE, [], NONE, NONE, NONE, NONE))
+    markers.set_rows(MarkerRows([], NONE, NONE, NONE, NONE, [], NONE, NONE, NONE, NONE, [], NONE, NONE))
     candidates.set_rows([])
     candidates.set_steps([])
     stages = StagePanel()

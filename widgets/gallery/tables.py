@@ -32,7 +32,8 @@ def marker_rows(markers: int = 41) -> MarkerRows:
     return MarkerRows(
         [f"M{k}" for k in range(markers)], seen, rng.integers(0, 12, markers), rng.gamma(2, 0.4, markers), group,
         [bones[g] for g in group], mean, 2.1 * mean, 3.3 * mean,
-        np.where(group > 0, rng.uniform(0, 75, markers), np.nan),
+        np.where(group > 0, rng.uniform(0, 75, markers), np.nan), ["left asis"] * 4 + [""] * (markers - 4),
+        np.where(np.arange(markers) < 4, 96.0, np.nan), np.where(np.arange(markers) < 4, 7.0, np.nan),
     )  # fmt: skip
 
 

@@ -29,6 +29,9 @@ class MarkerRows:
     bone : name of the bone each marker sits on, "" for none
     mean, p95, worst : (M,) mm, residual; NaN before there is a fit
     worst_time : (M,) s, the moment of the largest
+    landmark : bony landmark that each was drawn to, "" for none
+    probability : (M,) per cent that it sits there
+    beside : (M,) mm from there
     """
 
     labels: Sequence[str]
@@ -41,6 +44,9 @@ class MarkerRows:
     p95: np.ndarray
     worst: np.ndarray
     worst_time: np.ndarray
+    landmark: Sequence[str]
+    probability: np.ndarray
+    beside: np.ndarray
 
 
 def marker_columns(rows: Any, colours: np.ndarray | None = None) -> list[Column]:
@@ -59,6 +65,9 @@ def marker_columns(rows: Any, colours: np.ndarray | None = None) -> list[Column]
         Column("95 %", p95, "mm", ".1f", "Residual that 95 % of its frames stay below", bar=(0, most)),
         Column("Worst", rows.worst, "mm", ".1f", "Largest residual"),
         Column("Worst at", rows.worst_time, "time", lambda t: clock(float(t)), "Enter or a double click goes there"),
+        Column("Landmark", [name or None for name in rows.landmark], tooltip="Bony landmark that it was drawn to"),
+        Column("Sits there", rows.probability, "%", ".0f", "How probably it sits on that landmark", bar=(0, 100)),
+        Column("Beside", rows.beside, "mm", ".0f", "Distance from that landmark on the resting body"),
     ]
 
 

@@ -13,6 +13,7 @@ from markerscope.solver.fit.bundle import FINE, descend
 from markerscope.solver.fit.kinematics import Points, Pose
 from markerscope.solver.fit.method import chosen_row, fitted_motion, in_use, state_of
 from markerscope.solver.fit.problem import Problem
+from markerscope.solver.fit.pull.stage import to_landmarks
 from markerscope.solver.fit.refine import every_frame, set_on_markers
 from markerscope.solver.fit.results import Candidate, FittedMotion, Localization, Orientation
 from markerscope.solver.fit.settings import FitSettings
@@ -107,9 +108,12 @@ def fit_from_network(
     if settings.settle:
         problem = Problem(body, given.at(frames), landmarks)
         state, surface, _ = descend(problem, state, surface, FINE[-1:], weights)
+    known = replace(given, markers=seen.markers)
+    drawn = to_landmarks(body, known, landmarks, found.markers, frames, state, surface, weights, settings)
+    state, surface = drawn.state, drawn.surface
     start = set_on_markers(body, used, state.placement, Pose(poses.rotations, poses.trans, state.pose.betas))
     pose = every_frame(body, given, landmarks, frames, state, surface, weights, progress, start)
-    return fitted_motion(body, seen, found, ranked, settings, state, pose, time)
+    return replace(fitted_motion(body, seen, found, ranked, settings, state, pose, time), pull=drawn.pull)
 
 
 def _weights(settings: NeuralFitSettings, spread_deg: np.ndarray) -> Weights:

@@ -200,6 +200,24 @@ def test_another_cloud_of_markers_is_chosen_and_undone(actions: Actions, asks: A
     assert solved.board.state("localize") == "cached"
 
 
+def test_a_marker_is_pinned_to_a_landmark_and_let_go(actions: Actions, asks: Answers, solved: Workbench) -> None:
+    assert actions.why_not("landmark.pin") == "not exactly one marker is selected"
+    solved.selection.select_markers([3])
+    label = solved.board.current["markers"].labels[3]
+    asks.answers[f"{label} sits on"] = 0
+    assert actions.why_not("landmark.release") == "nothing was decided of the landmarks of the selected markers"
+    assert actions.trigger("landmark.pin")
+    ((marker, name),) = solved.board.settings["fit"].pinned
+    assert marker == 3 and name and solved.board.state("fit") == "stale"
+    assert actions.trigger("landmark.release")
+    assert solved.board.settings["fit"].pinned == () and solved.board.state("fit") == "cached"
+    drawn = solved.board.current["fit"].pull.landmark[3]
+    assert actions.trigger("landmark.refuse")
+    assert solved.board.settings["fit"].refused == ((3, drawn),)
+    assert actions.trigger("edit.undo")
+    assert solved.board.settings["fit"].refused == ()
+
+
 def test_range_and_offset(actions: Actions, solved: Workbench) -> None:
     assert actions.trigger("offset.found")
     assert solved.board.settings["sync"].offset is None

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import settings as tried
 from hypothesis import strategies as st
 
-from markerscope.app.models import clean_edits, edits, group_edits
+from markerscope.app.models import clean_edits, edits, group_edits, landmark_edits
 from markerscope.solver.cleaning.swaps import Proposal
 from markerscope.solver.clustering.segment import Segmentation, regroup, segment
 from markerscope.solver.core.errors import InputError
@@ -235,3 +235,27 @@ def test_samples_of_several_markers_are_put_back_in_one_step() -> None:
     assert edit.sentence == "2 markers kept as measured between frames 2 and 8"
     one = clean_edits.keep_samples(EMPTY, {3: (4, 8)}, LABELS)
     assert one.sentence == "d kept as measured in frames 4 to 8"
+
+
+def test_a_marker_is_pinned_to_a_landmark_kept_from_it_and_left_to_the_program() -> None:
+    pinned = landmark_edits.pin(EMPTY, 2, "left_asis", LABELS)
+    assert pinned.sentence == "c pinned to left asis"
+    assert stage(pinned.session, "fit").pinned == ((2, "left_asis"),)
+    taken = landmark_edits.pin(pinned.session, 3, "left_asis", LABELS).session
+    assert stage(taken, "fit").pinned == ((3, "left_asis"),), "a landmark holds one marker"
+    moved = landmark_edits.pin(pinned.session, 2, "right_asis", LABELS).session
+    assert stage(moved, "fit").pinned == ((2, "right_asis"),), "a marker sits on one landmark"
+    kept = landmark_edits.refuse(pinned.session, [(2, "left_asis"), (4, "")], LABELS)
+    assert kept.sentence == "c kept from left asis and 1 more"
+    assert (stage(kept.session, "fit").pinned, stage(kept.session, "fit").refused) == ((), ((2, "left_asis"), (4, "")))
+    assert stage(landmark_edits.pin(kept.session, 4, "c7", LABELS).session, "fit").refused == ((2, "left_asis"),)
+    assert landmark_edits.release(kept.session, [2, 4], LABELS).session == EMPTY
+    with pytest.raises(InputError, match="nothing was decided"):
+        landmark_edits.release(EMPTY, [2], LABELS)
+    with pytest.raises(InputError, match="kept from landmarks already"):
+        landmark_edits.refuse(kept.session, [(2, "left_asis")], LABELS)
+
+
+def test_landmarks_decided_in_the_settings_can_be_released_too() -> None:
+    written = replace(EMPTY, settings={"fit": {"pinned": [[1, "c7"]]}})
+    assert stage(landmark_edits.release(written, [1], LABELS).session, "fit").pinned == ()

@@ -21,6 +21,7 @@ from markerscope.solver.clustering.segment import segment
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.skeleton import JOINTS
 from markerscope.solver.fit.doubts.rules import Verdict
+from markerscope.solver.fit.pull.results import nothing_drawn
 from tests.app.views.conftest import Made
 
 
@@ -67,6 +68,19 @@ def test_markers_that_the_rules_doubt_are_marked(made: Made) -> None:
     ]
     of_others = replace(verdict, suspect=(99,))
     assert marker_table(tracks, None, made.motion, of_others).bone == plain, "of a file with other markers"
+
+
+def test_a_row_says_which_landmark_its_marker_was_drawn_to(made: Made) -> None:
+    pull = nothing_drawn("earned", 20.0, 14)
+    chance, after = pull.probability.copy(), pull.after.copy()
+    chance[2], after[2] = 0.9, 0.007
+    names = ("", "", "left_asis", *("",) * 11)
+    drawn = replace(pull, landmark=names, probability=chance, after=after)
+    table = marker_table(tracks_of(made.markers), None, replace(made.motion, pull=drawn))
+    assert table.landmark[2] == "left asis" and not any(table.landmark[:2])
+    assert np.isclose([table.probability[2], table.beside[2]], [90, 7]).all()
+    assert np.isnan([table.probability[3], table.beside[3]]).all()
+    assert set(marker_table(tracks_of(made.markers), None, made.motion).landmark) == {""}
 
 
 def test_before_any_result_the_table_tells_of_presence_alone(made: Made) -> None:
