@@ -166,13 +166,13 @@ def registration(given: Given, settings: Mapping[str, Any], progress: Progress =
 
 def labelled(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
     """A fit that is told the vertex below every marker, as MoSh++ is; it looks at no video."""
-    from markerscope.solver.body.bones import with_bone_lengths
+    from markerscope.solver.body.bones import load_body
     from markerscope.solver.fit.labelled.solve import solve_labelled
 
     if given.labels is None:
         raise ValueError("a labelled method needs labels")
     start = time.perf_counter()
-    body = with_bone_lengths(Body.load(given.body))
+    body = load_body(given.body)
     known = {label: int(v) for label, v in zip(given.markers.labels, given.labels.vertex, strict=True) if v >= 0}
     motion = solve_labelled(body, given.markers, known, settings.get("labelled"), progress)
     return Solved(motion, body, float("nan"), {"fit": time.perf_counter() - start})

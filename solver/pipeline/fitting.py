@@ -80,10 +80,9 @@ def fit_every_frame(given: Mapping[str, Any], settings: FitSettings, progress: P
 
 def _body(given: Mapping[str, Any]) -> Body:
     """The body with free bone lengths."""
-    from markerscope.solver.body.bones import with_bone_lengths
-    from markerscope.solver.body.model import Body
+    from markerscope.solver.body.bones import load_body
 
-    return with_bone_lengths(Body.load(given["body_file"]))
+    return load_body(given["body_file"])
 
 
 def find_neutral(given: Mapping[str, Any], settings: NeutralSettings, progress: Progress) -> Neutral:
