@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from markerscope.solver.cleaning.clean import Cleaned, CleanSettings, clean, put_back
+from markerscope.solver.cleaning.clean import Cleaned, CleanSettings, clean
 from markerscope.solver.cleaning.gaps import FillSettings
 from markerscope.solver.cleaning.outliers import OutlierSettings
 from markerscope.solver.cleaning.request import Filling, OutlierMethod
@@ -78,11 +78,6 @@ def clean_markers(given: Mapping[str, Any], settings: CleaningSettings, progress
     return clean(apply_proposals(markers, edits), settings.plain(), progress)
 
 
-def measured(cleaned: Cleaned) -> Markers:
-    """What was measured and not cut: the markers that a body is fitted to, and that it is judged by."""
-    return put_back(cleaned, outliers=False)
-
-
 def notes_of(cleaned: Cleaned) -> tuple[str, ...]:
     """What a user should know of the cleaning: what was cut, and each edit that is proposed."""
     cut = cleaned.outliers
@@ -92,5 +87,5 @@ def notes_of(cleaned: Cleaned) -> tuple[str, ...]:
 
 def said_cleaning(cleaned: Cleaned) -> str:
     """What was cut, filled and proposed."""
-    cut, filled = len(cleaned.outliers.frame), sum(fill.length for fill in cleaned.fills)
+    cut, filled = len(cleaned.outliers.frame), int(cleaned.filled.sum())
     return f"{cut} samples cut, {filled} filled, {len(cleaned.proposals)} edits of tracks proposed"

@@ -18,7 +18,6 @@ from markerscope.solver.fit.neutral import Neutral, NeutralSettings
 from markerscope.solver.fit.results import FittedMotion, Localization, Orientation
 from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
 from markerscope.solver.fit.surface import SurfaceDistance
-from markerscope.solver.pipeline.cleaning import measured
 from markerscope.solver.pipeline.stage import NoSettings
 
 if TYPE_CHECKING:
@@ -38,7 +37,7 @@ def scene(given: Mapping[str, Any]) -> tuple[Body, Observations, Points]:
     """The body with free bone lengths, what was observed on the markers' clock, and the landmarks' body points."""
     from markerscope.solver.fit.observe import observe
 
-    body, sync, markers = _body(given), given["sync"], measured(given["clean"])
+    body, sync, markers = _body(given), given["sync"], given["clean"].measured
     seen, points = observe(markers, given["prior"], given["landmarks"], body, sync.offset, sync.rate_ratio)
     return body, seen, points
 
@@ -117,7 +116,7 @@ def measure_surface(given: Mapping[str, Any], settings: NoSettings, progress: Pr
     """How far the markers are from the fitted skin."""
     from markerscope.solver.fit.surface import surface_distance
 
-    return surface_distance(_body(given), given["fit"], measured(given["clean"]).positions, progress)
+    return surface_distance(_body(given), given["fit"], given["clean"].measured.positions, progress)
 
 
 def check_result(given: Mapping[str, Any], settings: NoSettings, progress: Progress) -> Verdict:

@@ -13,7 +13,6 @@ from markerscope.solver.core.landmarks import Landmarks
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.prior import PosePrior
 from markerscope.solver.core.progress import Progress
-from markerscope.solver.pipeline.cleaning import measured
 from markerscope.solver.sync.offset import Sync
 
 _MOSTLY = 0.9
@@ -204,9 +203,9 @@ def _found_offset(given: Mapping[str, Any], settings: SyncSettings) -> Sync:
         watched = landmarks_of_prior(given["prior"], Body.load())
     window = None if settings.search_s is None else (-settings.search_s, settings.search_s)
     if settings.rate_ratio is None:
-        return find_offset(watched, measured(given["clean"]), search=window)
+        return find_offset(watched, given["clean"].measured, search=window)
     watched = replace(watched, time=watched.time * settings.rate_ratio)
-    found = find_offset(watched, measured(given["clean"]), search=window)
+    found = find_offset(watched, given["clean"].measured, search=window)
     # A ratio that was given stays: where another fits better, the two agree in the middle of the video.
     middle = 0.5 * (watched.time[0] + watched.time[-1])
     return replace(found, rate_ratio=settings.rate_ratio, offset=found.offset + (found.rate_ratio - 1) * middle)

@@ -15,7 +15,6 @@ from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.skeleton import BONES, JOINTS
 from markerscope.solver.fit.results import FittedMotion, Orientation
-from markerscope.solver.pipeline.cleaning import measured
 from markerscope.solver.pipeline.doubts import doubts
 from markerscope.solver.pipeline.session import Session
 from markerscope.solver.pipeline.stage import GraphRun
@@ -64,7 +63,7 @@ def report_of(
 
 
 def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str, Any]) -> ReportData:
-    markers, motion, ranked = measured(graph["clean"]), graph["fit"], graph["orient"]
+    markers, motion, ranked = graph["clean"].measured, graph["fit"], graph["orient"]
     notes = {"marker_file": markers.notes, "prior_file": graph["prior"].notes}
     inputs = tuple(
         InputFile(_ROLES.get(name, name), row["file"], row["sha256"], tuple(notes.get(name, ())))

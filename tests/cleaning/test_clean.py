@@ -17,7 +17,7 @@ from markerscope.solver.cleaning.swaps import Proposal, apply_proposals, find_pr
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.progress import silent
-from markerscope.solver.pipeline.cleaning import CleaningSettings, clean_markers, measured
+from markerscope.solver.pipeline.cleaning import CleaningSettings, clean_markers
 from markerscope.solver.pipeline.codec import decode, encode
 from tests.cleaning.scenes import RATE, lose, rigid
 
@@ -175,7 +175,7 @@ def test_edits_by_hand_are_made_before_the_cleaning_and_unknown_markers_refused(
     truth = crossing()
     given = apply_proposals(truth, [Proposal("swap", 40, 119, (0, 1), 0.0, "")])
     cleaned = clean_markers({"markers": given}, CleaningSettings(swaps=((0, 1, 40),)), silent)
-    assert np.array_equal(measured(cleaned).positions, truth.positions)
+    assert np.array_equal(cleaned.measured.positions, truth.positions)
     assert not cleaned.proposals
     with pytest.raises(InputError, match="there is no marker 9"):
         clean_markers({"markers": given}, CleaningSettings(keep=((9, 0, 1),)), silent)
@@ -213,7 +213,19 @@ def test_what_the_stage_fills_counts_as_measured_nowhere() -> None:
     markers = damaged()
     cleaned = clean_markers({"markers": markers}, CleaningSettings(fill="regression"), silent)
     assert np.isfinite(cleaned.markers.positions[30:61, 1]).all()
-    seen = measured(cleaned).present
+    seen = cleaned.measured.present
     assert not seen[30:61, 1].any()
     assert not seen[80, 3]
     assert (seen | ~markers.present | cleaned.outliers.mask(seen.shape)).all()
+    assert np.array_equal(cleaned.filled, cleaned.markers.present & ~seen)
+    assert cleaned.filled.sum() == sum(fill.length for fill in cleaned.fills)
+
+
+def test_what_the_file_had_as_filled_is_not_taken_out_with_what_was_filled_here() -> None:
+    already = np.zeros(damaged().present.shape, dtype=bool)
+    already[5, 2] = True
+    cleaned = clean(replace(damaged(), filled=already))
+    measured = cleaned.measured
+    assert cleaned.filled[30, 1] and not cleaned.filled[5, 2]
+    assert measured.filled is not None and measured.filled[5, 2] and measured.filled.sum() == 1
+    assert measured.present[5, 2] and not measured.present[30, 1]
