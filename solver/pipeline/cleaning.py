@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from markerscope.solver.cleaning.clean import Cleaned, CleanSettings, clean
 from markerscope.solver.cleaning.gaps import FillSettings
@@ -61,9 +59,8 @@ class CleaningSettings:
         )
 
 
-def clean_markers(given: Mapping[str, Any], settings: CleaningSettings, progress: Progress) -> Cleaned:
+def clean_markers(settings: CleaningSettings, progress: Progress, *, markers: Markers) -> Cleaned:
     """The edits made that the user chose, outliers cut, gaps filled if asked for."""
-    markers: Markers = given["markers"]
     count, frames = len(markers.labels), len(markers.positions)
     edits = [
         *(Proposal("swap", frame, frames - 1, (a, b), 0.0, "") for a, b, frame in settings.swaps),
