@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Generic, Literal, TypeVar, overload
 
 from markerscope.solver.core.errors import Cancelled, InputError
 from markerscope.solver.core.progress import Found, Progress, part_of, silent, tell
@@ -21,6 +21,11 @@ from markerscope.solver.pipeline.source import Source, Touched, Watch, changed
 from markerscope.solver.pipeline.store import Absent, Store
 
 State = Literal["cached", "stale", "not run", "running", "failed"]
+T = TypeVar("T")
+
+
+class StageName(str, Generic[T]):
+    """The name of a stage that leaves a ``T``: what is asked for by it has that type."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +135,10 @@ class GraphRun:
     events: Mapping[str, Event]
     _value: Callable[[str], Any] = field(repr=False)
 
+    @overload
+    def __getitem__(self, stage: StageName[T]) -> T: ...
+    @overload
+    def __getitem__(self, stage: str) -> Any: ...
     def __getitem__(self, stage: str) -> Any:
         return self._value(stage)
 

@@ -28,6 +28,7 @@ from markerscope.solver.io.export_smpl import write_smpl_npz
 from markerscope.solver.io.together import together
 from markerscope.solver.pipeline.digest import canonical, file_digest
 from markerscope.solver.pipeline.methods import graph_of
+from markerscope.solver.pipeline.names import ANGLES, CLEAN, FIT
 from markerscope.solver.pipeline.session import Session
 from markerscope.solver.pipeline.source import changed
 from markerscope.solver.pipeline.stage import GraphRun
@@ -149,7 +150,7 @@ def _write(
     from markerscope.solver.io.export_trc import write_trc
     from markerscope.solver.report.report_of import report_of
 
-    markers, motion, angles = graph["clean"].measured, graph["fit"], graph["angles"]
+    markers, motion, angles = graph[CLEAN].measured, graph[FIT], graph[ANGLES]
     body_file = session.inputs.get("body_file")
     body = load_body(body_file.path if body_file else None)
     if body_file is not None and body_file.digest and file_digest(body_file.path) != body_file.digest:

@@ -12,8 +12,9 @@ from typing import Any, TypedDict, Unpack
 import pytest
 
 from markerscope.solver.core.progress import Progress
-from markerscope.solver.pipeline.methods import GRAPHS
-from markerscope.solver.pipeline.stage import NoSettings, Stage, inputs_of
+from markerscope.solver.pipeline import names
+from markerscope.solver.pipeline.methods import GRAPHS, result_type
+from markerscope.solver.pipeline.stage import NoSettings, Stage, StageName, inputs_of
 from markerscope.solver.pipeline.stages import SOURCES
 
 REQUIRED = {"marker_file"}
@@ -76,3 +77,12 @@ def test_inputs_that_are_unpacked_are_inputs() -> None:
 
     assert inputs_of(run) == {"more", "one", "other"}
     assert inputs_of(whatever) is None
+
+
+def test_the_names_of_stages_know_what_each_leaves_in_any_method() -> None:
+    typed = {value: value for value in vars(names).values() if isinstance(value, StageName)}
+    assert typed.keys() == {stage.name for graph in GRAPHS.values() for stage in graph}
+    for name in typed.values():
+        (declared,) = typing.get_args(name.__orig_class__)  # type: ignore[attr-defined]
+        assert members(declared) == members(result_type(name)), name
+        assert getattr(names, name.upper()) == name
