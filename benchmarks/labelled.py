@@ -17,8 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from markerscope.solver.angles.angles import world_rotations
-from markerscope.solver.body.bones import with_bone_lengths
-from markerscope.solver.body.model import Body
+from markerscope.solver.body.bones import load_body
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.rotations import log_so3
@@ -70,7 +69,7 @@ def main() -> int:
 
 def errors_deg(markers: Markers) -> tuple[float, float, float]:
     """Root mean square, degrees, of pelvis, left hip and right hip: rotations since the first frame, both ways."""
-    body = with_bone_lengths(Body.load())
+    body = load_body()
     motion = solve_labelled(body, markers, {label: BONES[label] for label in markers.labels if label in BONES})
     turn = world_rotations(motion.rotations)
     # Both as rotations of the lab since the first frame, so that neither's segment axes matter.

@@ -9,8 +9,7 @@ import numpy as np
 
 from benchmarks.views import made_up
 from markerscope.app.models.imports import new_session
-from markerscope.solver.body.bones import with_bone_lengths
-from markerscope.solver.body.model import Body
+from markerscope.solver.body.bones import load_body
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.fit.results import FittedMotion
 from markerscope.solver.io.export_c3d import write_c3d
@@ -34,7 +33,7 @@ def full_size(solved: Path, folder: Path) -> Path:
     known = {s.name: given.store.get(s.name, keys[s.name], s.result) for s in graph_of(given)}
     motion: FittedMotion = known["fit"]
     old = known["clean"].markers
-    body = with_bone_lengths(Body.load())
+    body = load_body()
     rng = np.random.default_rng(0)
     more = rng.choice(np.flatnonzero(body.marker_mask), max(MARKERS - len(old.labels), 0), replace=False)
     placed = body.pose(motion.rotations, motion.betas, motion.trans, more)[0]
@@ -101,7 +100,7 @@ def enlarged(video: Path, path: Path) -> None:
 
 def long_markers(path: Path) -> Path:
     """Ten minutes at 100 Hz of 60 markers on a body that swings its limbs."""
-    positions = made_up(with_bone_lengths(Body.load()), frames=60_000, markers=60)["markers"].positions
+    positions = made_up(load_body(), frames=60_000, markers=60)["markers"].positions
     write_c3d(path, Markers(positions, 100.0, tuple(f"M{k}" for k in range(60))), up="z")
     return path
 

@@ -22,7 +22,7 @@ from markerscope.app.views.affinity import affinity_picture, recut
 from markerscope.app.views.markers import marker_table
 from markerscope.app.views.timelines import offset_row, overview, presence_row, residual_row
 from markerscope.app.views.tracks import tracks_of
-from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.bones import load_body
 from markerscope.solver.body.model import Body
 from markerscope.solver.clustering.segment import SegmentSettings, segment
 from markerscope.solver.core.camera import CameraResult
@@ -46,7 +46,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("result", type=Path, nargs="?")
     options = parser.parse_args()
-    body = with_bone_lengths(Body.load())
+    body = load_body()
     long = made_up(body, frames=60_000, markers=60)
     found = long if options.result is None else loaded(options.result)
     name = "made up" if options.result is None else options.result.name

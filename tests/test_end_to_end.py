@@ -293,10 +293,10 @@ def test_poses_and_a_video_together(by_video: Solved, tmp_path: Path) -> None:
         np.savez(nameless, **{name: file[name] for name in file if name != "mocap_frame_rate"})
     from markerscope.solver.pipeline.inputs import PriorSettings, pose_prior
 
-    found = pose_prior({"prior_file": nameless, "landmarks": watched(made)}, PriorSettings(), silent)
+    found = pose_prior(PriorSettings(), silent, prior_file=nameless, landmarks=watched(made))
     np.testing.assert_allclose(np.diff(found.time), 1 / made.rate, rtol=1e-6)
     assert not any("assumed" in note for note in found.notes)
-    alone = pose_prior({"prior_file": nameless, "landmarks": None}, PriorSettings(), silent)
+    alone = pose_prior(PriorSettings(), silent, prior_file=nameless, landmarks=None)
     assert any("30 Hz is assumed" in note for note in alone.notes)
 
 

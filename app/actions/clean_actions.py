@@ -9,17 +9,18 @@ from markerscope.app.models import clean_edits
 from markerscope.app.models.workbench import Said, Workbench
 from markerscope.solver.cleaning.swaps import Proposal
 from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline.names import CLEAN, MARKERS
 
 _needs_clean = needs("clean", "the markers have not been cleaned")
 
 
 def _no_proposal(bench: Workbench) -> str:
-    return "" if bench.board.current["clean"].proposals else "no edit of tracks is proposed"
+    return "" if bench.board.current[CLEAN].proposals else "no edit of tracks is proposed"
 
 
 def _next(bench: Workbench, asks: Asks) -> None:
     """Go to the next proposal after the clock's frame, and select its markers."""
-    proposals = sorted(bench.board.current["clean"].proposals, key=lambda proposal: proposal.frame)
+    proposals = sorted(bench.board.current[CLEAN].proposals, key=lambda proposal: proposal.frame)
     here = bench.clock.marker_frame or 0
     chosen = next((p for p in proposals if p.frame > here), proposals[0])
     bench.selection.select_markers(chosen.markers)
@@ -29,7 +30,7 @@ def _next(bench: Workbench, asks: Asks) -> None:
 
 def _meant(bench: Workbench) -> Proposal | None:
     """The proposal of the two selected markers that is nearest to the clock's frame."""
-    own = [p for p in bench.board.current["clean"].proposals if {*p.markers} == bench.selection.markers]
+    own = [p for p in bench.board.current[CLEAN].proposals if {*p.markers} == bench.selection.markers]
     here = bench.clock.marker_frame or 0
     return min(own, key=lambda proposal: abs(proposal.frame - here), default=None)
 
@@ -46,7 +47,7 @@ def _accept(bench: Workbench, asks: Asks) -> None:
 
 def _keep(bench: Workbench, asks: Asks) -> None:
     """Put back what was cut of the selected markers: in the range, or else the stretch at or next to this frame."""
-    cleaned = bench.board.current["clean"]
+    cleaned = bench.board.current[CLEAN]
     mask = cleaned.outliers.mask(cleaned.markers.positions.shape[:2])
     stretches = {
         marker: found
@@ -55,7 +56,7 @@ def _keep(bench: Workbench, asks: Asks) -> None:
     }
     if not stretches:
         raise InputError("nothing was cut of the selected markers there", "what was cut", "click on a cut frame first")
-    labels = bench.board.current["markers"].labels
+    labels = bench.board.current[MARKERS].labels
     bench.document.apply(clean_edits.keep_samples(bench.document.session, stretches, labels))
 
 
@@ -77,7 +78,7 @@ def _stretch(bench: Workbench, cut: np.ndarray) -> tuple[int, int] | None:
 def _nothing_cut(bench: Workbench) -> str:
     if not bench.selection.markers:
         return "no marker is selected"
-    cut = set(bench.board.current["clean"].outliers.marker.tolist())
+    cut = set(bench.board.current[CLEAN].outliers.marker.tolist())
     return "" if cut & bench.selection.markers else "nothing was cut of the selected markers"
 
 

@@ -11,7 +11,8 @@ from markerscope.app.actions.run_actions import run_until
 from markerscope.app.models import edits, group_edits
 from markerscope.app.models.edits import Edit
 from markerscope.app.models.workbench import Workbench
-from markerscope.solver.clustering.segment import Segmentation
+from markerscope.solver.fit.results import Localization
+from markerscope.solver.pipeline.names import LOCALIZE, MARKERS, SEGMENT
 
 _needs_groups = needs("segment", "the groups of markers are not there")
 
@@ -44,7 +45,7 @@ def _nothing_redone(bench: Workbench) -> str:
 
 
 def _all(bench: Workbench, asks: Asks) -> None:
-    bench.selection.select_markers(range(len(bench.board.current["markers"].labels)))
+    bench.selection.select_markers(range(len(bench.board.current[MARKERS].labels)))
 
 
 def _none(bench: Workbench, asks: Asks) -> None:
@@ -52,11 +53,11 @@ def _none(bench: Workbench, asks: Asks) -> None:
 
 
 def _invert(bench: Workbench, asks: Asks) -> None:
-    bench.selection.select_markers(range(len(bench.board.current["markers"].labels)), "toggle")
+    bench.selection.select_markers(range(len(bench.board.current[MARKERS].labels)), "toggle")
 
 
 def _whole_groups(bench: Workbench, asks: Asks) -> None:
-    groups = bench.board.current["segment"].clusters
+    groups = bench.board.current[SEGMENT].clusters
     touched = {int(groups[m]) for m in bench.selection.markers} - {-1}
     bench.selection.select_markers(np.flatnonzero(np.isin(groups, list(touched))), "add")
 
@@ -66,16 +67,16 @@ GroupEdit = Callable[..., Edit]
 
 def _group(edit: GroupEdit) -> Callable[[Workbench, Asks], object]:
     def run(bench: Workbench, asks: Asks) -> None:
-        found: Segmentation = bench.board.current["segment"]
-        labels = bench.board.current["markers"].labels
+        found = bench.board.current[SEGMENT]
+        labels = bench.board.current[MARKERS].labels
         bench.document.apply(edit(bench.document.session, found, bench.selection.markers, labels))
 
     return run
 
 
 def _move(bench: Workbench, asks: Asks) -> None:
-    found: Segmentation = bench.board.current["segment"]
-    labels, chosen = bench.board.current["markers"].labels, bench.selection.markers
+    found = bench.board.current[SEGMENT]
+    labels, chosen = bench.board.current[MARKERS].labels, bench.selection.markers
     own = {int(found.clusters[m]) for m in chosen}
     targets = [k for k in range(found.count) if own != {k}]
     members = {k: [labels[m] for m in np.flatnonzero(found.clusters == k)] for k in targets}
@@ -87,7 +88,7 @@ def _move(bench: Workbench, asks: Asks) -> None:
 
 
 def _take_in(bench: Workbench, asks: Asks) -> None:
-    labels = bench.board.current["markers"].labels
+    labels = bench.board.current[MARKERS].labels
     bench.document.apply(group_edits.take_in(bench.document.session, bench.selection.markers, labels))
 
 
@@ -132,10 +133,16 @@ def _not_pinned(bench: Workbench) -> str:
     return "" if getattr(bench.board.settings.get("fit"), "candidate", None) is not None else "no candidate is pinned"
 
 
+def _clouds(bench: Workbench) -> np.ndarray:
+    """(M,) number of the cloud that each marker belongs to; (0,) where the method makes out none."""
+    found = bench.board.current[LOCALIZE]
+    return found.cloud if isinstance(found, Localization) else np.zeros(0, dtype=int)
+
+
 def _cloud(bench: Workbench, asks: Asks) -> None:
-    found, labels = bench.board.current["localize"], bench.board.current["markers"].labels
-    sizes = np.bincount(found.cloud[found.cloud >= 0])
-    members = [[labels[m] for m in np.flatnonzero(found.cloud == c)] for c in range(len(sizes))]
+    cloud, labels = _clouds(bench), bench.board.current[MARKERS].labels
+    sizes = np.bincount(cloud[cloud >= 0])
+    members = [[labels[m] for m in np.flatnonzero(cloud == c)] for c in range(len(sizes))]
     options = [
         f"Cloud {c + 1}, {len(own)} markers: {', '.join(own[:4])}{' …' if len(own) > 4 else ''}"
         for c, own in enumerate(members)
@@ -148,8 +155,7 @@ def _cloud(bench: Workbench, asks: Asks) -> None:
 def _one_cloud(bench: Workbench) -> str:
     if reason := needs("localize", "the markers have not been placed yet")(bench):
         return reason
-    cloud = getattr(bench.board.current["localize"], "cloud", np.zeros(0, dtype=int))
-    return "" if cloud.max(initial=0) > 0 else "the markers form one cloud"
+    return "" if _clouds(bench).max(initial=0) > 0 else "the markers form one cloud"
 
 
 def _found_offset(bench: Workbench, asks: Asks) -> None:

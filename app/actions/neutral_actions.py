@@ -5,6 +5,7 @@ from __future__ import annotations
 from markerscope.app.actions.action import Action, Asks, needs, needs_session
 from markerscope.app.models import edits
 from markerscope.app.models.workbench import Workbench
+from markerscope.solver.pipeline.names import FIT
 
 _SPAN_S = 0.2
 """How long the pose under the cursor is averaged over."""
@@ -12,7 +13,7 @@ _needs_fit = needs("fit", "the fitted body is not there")
 
 
 def _here(bench: Workbench, asks: Asks) -> None:
-    time, motion = bench.clock.time, bench.board.current["fit"].time
+    time, motion = bench.clock.time, bench.board.current[FIT].time
     start = min(max(time - _SPAN_S / 2, motion[0]), max(motion[-1] - _SPAN_S, motion[0]))
     _apply(bench, edits.set_neutral_span(bench.document.session, start, min(start + _SPAN_S, motion[-1])))
 

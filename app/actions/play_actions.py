@@ -10,6 +10,7 @@ from markerscope.app.actions.action import Action, Asks, first, needs
 from markerscope.app.models.clock import Clock
 from markerscope.app.models.workbench import Said, Workbench
 from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline.names import FIT, MARKERS
 
 
 def _empty(bench: Workbench) -> str:
@@ -32,7 +33,7 @@ def _to_here(bench: Workbench, asks: Asks) -> None:
 
 def _worst(bench: Workbench, asks: Asks) -> None:
     """Go to the frame in which the selected markers, or all, are furthest from their places."""
-    residual = bench.board.current["fit"].residual
+    residual = bench.board.current[FIT].residual
     chosen = sorted(bench.selection.markers) or slice(None)
     known = np.nan_to_num(residual[:, chosen], nan=-1.0)
     if known.size == 0 or known.max() < 0:
@@ -45,7 +46,7 @@ def _next_gap(bench: Workbench, asks: Asks) -> None:
 
     Every marker's gaps count by themselves: in a real recording there is hardly a frame that shows them all.
     """
-    markers = bench.board.current["markers"]
+    markers = bench.board.current[MARKERS]
     chosen = sorted(m for m in bench.selection.markers if m < len(markers.labels)) or list(range(len(markers.labels)))
     lost = ~markers.present[:, chosen]
     begins = lost & ~np.concatenate([np.zeros((1, len(chosen)), bool), lost[:-1]])

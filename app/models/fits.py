@@ -9,6 +9,7 @@ import numpy as np
 from markerscope.app.models.results import Ref, Results
 from markerscope.app.models.signal import Signal
 from markerscope.app.models.stages import StageBoard
+from markerscope.solver.pipeline.names import FIT
 
 MOST = 12
 """Fits that are compared at most, the newest: beyond that no eye tells the curves apart."""
@@ -74,7 +75,7 @@ class CachedFits:
     def _residual(self, key: str) -> FitResidual | None:
         known = self.known.get(key)
         if known is None and self.board.results.is_loaded("fit", key):
-            motion = self.board.results.get("fit", key)
+            motion = self.board.results.get(FIT, key)
             known = FitResidual(np.array(motion.time), motion.residual.astype(np.float32))
         return known
 

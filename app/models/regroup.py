@@ -9,6 +9,7 @@ from markerscope.app.models.results import Results
 from markerscope.solver.clustering.segment import regroup
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.pipeline.digest import canonical
+from markerscope.solver.pipeline.names import SEGMENT
 from markerscope.solver.pipeline.stage import Stage
 from markerscope.solver.pipeline.store import Absent
 
@@ -31,7 +32,7 @@ def regrouped(graph: Sequence[Stage], keys: Mapping[str, str], settings: Mapping
         if about.get("version") != stage.version or about.get("inputs") != inputs or _uncut(about["settings"]) != rest:
             continue
         try:
-            found = regroup(results.get("segment", entry.key), wanted)
+            found = regroup(results.get(SEGMENT, entry.key), wanted)
             new = {**about, "settings": canonical(wanted), "headline": stage.headline(found)}
             results.store.put("segment", keys["segment"], found, new)
         except (Absent, InputError):

@@ -8,12 +8,14 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar, overload
 
 from markerscope.app.models.signal import Signal
 from markerscope.solver.pipeline.methods import result_type
+from markerscope.solver.pipeline.stage import StageName
 from markerscope.solver.pipeline.store import Absent, Entry, Store
 
+T = TypeVar("T")
 _MEMORY = 1 << 30
 """Bytes of arrays that are kept at most; ten minutes of a full session take some 300 MB."""
 _AGAIN_S, _LONGEST_S = 0.4, 60.0
@@ -78,6 +80,10 @@ class Results:
         self._listed: dict[str, tuple[int, tuple[Entry, ...]]] = {}
         self._written: dict[Ref, float] = {}
 
+    @overload
+    def get(self, stage: StageName[T], key: str) -> T: ...
+    @overload
+    def get(self, stage: str, key: str) -> Any: ...
     def get(self, stage: str, key: str) -> Any:
         """A stage's result.
 
@@ -244,9 +250,17 @@ class StageResults(Mapping[str, Any]):
         self.results = results
         self.keys_of_stages = dict(keys)
 
+    @overload
+    def __getitem__(self, stage: StageName[T]) -> T: ...
+    @overload
+    def __getitem__(self, stage: str) -> Any: ...
     def __getitem__(self, stage: str) -> Any:
         return self.results.get(stage, self.keys_of_stages[stage])
 
+    @overload
+    def get(self, stage: StageName[T], default: None = None) -> T | None: ...
+    @overload
+    def get(self, stage: str, default: Any = None) -> Any: ...
     def get(self, stage: str, default: Any = None) -> Any:
         """The stage's result, or ``default`` where it has none."""
         try:

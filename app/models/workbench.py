@@ -26,6 +26,7 @@ from markerscope.app.models.signal import Signal
 from markerscope.app.models.stages import Failure, StageBoard
 from markerscope.app.models.view_state import restore_view, view_of
 from markerscope.solver.core.errors import Cancelled, InputError, MarkerscopeError
+from markerscope.solver.pipeline.names import SYNC
 from markerscope.solver.pipeline.store import Absent
 
 Level = Literal["note", "warning", "error"]
@@ -208,7 +209,7 @@ class Workbench:
             self.clock.set_sync(0.0)
         else:
             try:
-                found = self.board.results.get("sync", latest[0])
+                found = self.board.results.get(SYNC, latest[0])
             except Absent:
                 self.board.results.load_ahead("sync", latest[0])  # tries again, and tells if that is in vain
                 return

@@ -208,10 +208,9 @@ class Shown:
         return None if given is None else given.path
 
     def _load_body(self, path: Path | None) -> None:
-        from markerscope.solver.body.bones import with_bone_lengths
-        from markerscope.solver.body.model import Body
+        from markerscope.solver.body.bones import load_body
 
-        self._bodies = {path: with_bone_lengths(Body.load(path))}
+        self._bodies = {path: load_body(path)}
 
     def _load_body_ahead(self) -> None:
         """Have the body at hand before the first fit is to be drawn: reading it takes longer than a picture may."""

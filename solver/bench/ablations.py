@@ -9,7 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from markerscope.solver.bench.methods import PAPER_CODE, Given, Solved, Variant, bundle, outcome, paper, run_stages
+from markerscope.solver.bench.methods import (
+    PAPER_CODE,
+    Given,
+    Solved,
+    Variant,
+    bundle,
+    outcome,
+    paper,
+    run_stages,
+    scene_of,
+)
 from markerscope.solver.body.model import Body
 from markerscope.solver.core.camera import CameraResult
 from markerscope.solver.core.markers import Markers
@@ -37,10 +47,9 @@ def unfitted(given: Given, settings: Mapping[str, Any], progress: Progress = sil
     from markerscope.solver.fit.kinematics import Pose, forward, place_points
     from markerscope.solver.fit.placement import Skin
     from markerscope.solver.fit.published.motion import fitted_motion
-    from markerscope.solver.pipeline.fitting import scene
 
     results, seconds = run_stages("bundle", given, settings, "localize", progress)
-    body, seen, _ = scene(results)
+    body, seen, _ = scene_of(results)
     found = results["localize"]
     turn, vertex = found.R_lab_cam[0], found.vertex[0]
     rotations, betas = seen.prior.copy(), np.zeros(body.shape_count)
@@ -70,10 +79,8 @@ def unfitted(given: Given, settings: Mapping[str, Any], progress: Progress = sil
 
 def paper_by_stages(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
     """The published method, with what it had after part matching, stage 2 and stage 4 of its best yaw (table 4)."""
-    from markerscope.solver.pipeline.fitting import scene
-
     results, seconds = run_stages("paper", given, settings, "fit", progress)
-    body, seen, _ = scene(results)
+    body, seen, _ = scene_of(results)
     solved = outcome("paper", results, seconds)
     return replace(solved, steps=partial(_paper_steps, body, seen, given.markers, results))
 

@@ -19,9 +19,11 @@ from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.prior import PosePrior
 from markerscope.solver.core.progress import Progress, silent
 from markerscope.solver.core.request import Method
+from markerscope.solver.fit.kinematics import Points
 from markerscope.solver.fit.published.results import PaperSolve
 from markerscope.solver.fit.published.settings import PaperLocalizeSettings, PaperSolveSettings
 from markerscope.solver.fit.results import FittedMotion, Orientation
+from markerscope.solver.fit.state import Observations
 from markerscope.solver.pipeline.inputs import SyncSettings
 from markerscope.solver.pipeline.methods import GRAPHS
 
@@ -153,11 +155,10 @@ def neural(given: Given, settings: Mapping[str, Any], progress: Progress = silen
 def registration(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
     """The video's pose, set rigidly on the markers: the paper's baseline."""
     from markerscope.solver.fit.published.registration import register
-    from markerscope.solver.pipeline.fitting import scene
 
     results, seconds = run_stages("paper", given, settings, "localize", progress)
     start = time.perf_counter()
-    body, seen, points = scene(results)
+    body, seen, points = scene_of(results)
     motion = register(
         body, seen, points, given.markers.time, results["localize"], settings["localize"], given.prior.betas, progress
     )
@@ -166,13 +167,13 @@ def registration(given: Given, settings: Mapping[str, Any], progress: Progress =
 
 def labelled(given: Given, settings: Mapping[str, Any], progress: Progress = silent) -> Solved:
     """A fit that is told the vertex below every marker, as MoSh++ is; it looks at no video."""
-    from markerscope.solver.body.bones import with_bone_lengths
+    from markerscope.solver.body.bones import load_body
     from markerscope.solver.fit.labelled.solve import solve_labelled
 
     if given.labels is None:
         raise ValueError("a labelled method needs labels")
     start = time.perf_counter()
-    body = with_bone_lengths(Body.load(given.body))
+    body = load_body(given.body)
     known = {label: int(v) for label, v in zip(given.markers.labels, given.labels.vertex, strict=True) if v >= 0}
     motion = solve_labelled(body, given.markers, known, settings.get("labelled"), progress)
     return Solved(motion, body, float("nan"), {"fit": time.perf_counter() - start})
@@ -215,7 +216,8 @@ def run_stages(
         if name == "sync":
             results[name] = _clock(stage.run, inputs, given.nominal_offset)
         else:
-            results[name] = stage.run(inputs, settings[name] if name in settings else stage.settings(), progress)
+            own = settings[name] if name in settings else stage.settings()
+            results[name] = stage.run(own, progress, **inputs)
         seconds[name] = time.perf_counter() - start
 
     ensure(wanted)
@@ -225,22 +227,34 @@ def run_stages(
 def _clock(run: Callable[..., Any], inputs: Mapping[str, Any], nominal: float) -> Any:
     """The offset found from the motion; where a solve would ask its user for it, what the user believes."""
     try:
-        found = run(inputs, SyncSettings(), silent)
+        found = run(SyncSettings(), silent, **inputs)
     except InputError:
         found = None
     if found is not None and found.confidence >= _UNSURE:
         return found
-    return run(inputs, SyncSettings(offset=nominal), silent)
+    return run(SyncSettings(offset=nominal), silent, **inputs)
+
+
+def scene_of(results: Mapping[str, Any]) -> tuple[Body, Observations, Points]:
+    """What the stages of the fit look at, from the results of those before them."""
+    from markerscope.solver.pipeline.fitting import FittedTo, scene
+
+    given = FittedTo(
+        clean=results["clean"],
+        prior=results["prior"],
+        landmarks=results["landmarks"],
+        sync=results["sync"],
+        body_file=results["body_file"],
+    )
+    return scene(**given)
 
 
 def outcome(name: Method, results: Mapping[str, Any], seconds: Mapping[str, float]) -> Solved:
     """The answer of a method whose stages have all run."""
-    from markerscope.solver.pipeline.fitting import scene
-
     ranked: Orientation = results["orient"]
     found, motion, sync = results["localize"], results["fit"], results["sync"]
     frames = found.frames if name == "paper" else found.many
-    body = scene(results)[0]
+    body = scene_of(results)[0]
     alternatives = []
     for candidate in ranked.candidates:
         if candidate.refined and len(candidate.rotations) == len(frames):

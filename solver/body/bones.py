@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
@@ -51,6 +52,16 @@ def with_bone_lengths(body: Body) -> Body:
         joint_dirs=np.concatenate([body.joint_dirs, np.stack(joint_modes, -1)], axis=2),
         _torch={},
     )
+
+
+def load_body(path: str | Path | None = None) -> Body:
+    """The body of a file, or the embedded one, with free bone lengths: what every solve fits and every export poses.
+
+    Raises
+    ------
+    InputError : the file cannot be read, or holds no body
+    """
+    return with_bone_lengths(Body.load(path))
 
 
 def _mode(body: Body, mode: BoneMode) -> tuple[np.ndarray, np.ndarray]:

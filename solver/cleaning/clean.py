@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -76,6 +77,19 @@ class Cleaned:
     proposals: tuple[Proposal, ...]
     notes: tuple[str, ...]
 
+    @cached_property
+    def measured(self) -> Markers:
+        """What was measured and not cut: the markers that a body is fitted to, and that it is judged by."""
+        return put_back(self, outliers=False) if self.fills else self.markers
+
+    @cached_property
+    def filled(self) -> np.ndarray:
+        """(T, M) True where this cleaning filled a sample; those that the file had as filled are not among them."""
+        mask = np.zeros(self.markers.positions.shape[:2], dtype=bool)
+        for span in self.fills:
+            mask[span.first : span.last + 1, span.marker] = True
+        return mask
+
 
 def clean(
     markers: Markers,
@@ -130,11 +144,10 @@ def put_back(cleaned: Cleaned, outliers: bool = True, fills: bool = True) -> Mar
     positions = markers.positions.copy()
     filled = None if markers.filled is None else markers.filled.copy()
     cut = cleaned.outliers
-    for span in cleaned.fills if fills else ():
-        frames = slice(span.first, span.last + 1)
-        positions[frames, span.marker] = np.nan
+    if fills:
+        positions[cleaned.filled] = np.nan
         if filled is not None:
-            filled[frames, span.marker] = False
+            filled[cleaned.filled] = False
     if outliers:
         positions[cut.frame, cut.marker] = cut.values
         if filled is not None:

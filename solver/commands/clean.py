@@ -142,6 +142,6 @@ def _totals(cleaned: Cleaned) -> dict[str, object]:
         "frames": len(markers.positions),
         "markers": len(markers.labels),
         "samples_cut": len(cleaned.outliers.frame),
-        "samples_filled": sum(fill.length for fill in cleaned.fills),
+        "samples_filled": int(cleaned.filled.sum()),
         "samples_lost": int((~markers.present).sum()),
     }

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from markerscope.solver.body.bones import with_bone_lengths
-from markerscope.solver.body.model import Body
+from markerscope.solver.body.bones import load_body
 from markerscope.solver.core.progress import Progress, silent
 from markerscope.solver.core.request import Outcome
 from markerscope.solver.core.skeleton import JOINTS
@@ -23,7 +22,7 @@ def judge_demo(result: Path, progress: Progress = silent) -> Outcome:
     truth = load_truth()
     found = read_motion(result)
     time = np.arange(len(found.rotations)) / found.rate if found.time is None else found.time
-    ours, _ = posed(found, time, with_bone_lengths(Body.load()), known=True)
+    ours, _ = posed(found, time, load_body(), known=True)
     clock = np.arange(len(truth.motion.rotations)) / truth.motion.rate + time[0]
     theirs = Posed(truth.body, truth.betas, clock, truth.motion.rotations, truth.motion.trans, truth.joints)
     compared = compare(ours, theirs, measured_markers(result), "the embedded session", (), progress)

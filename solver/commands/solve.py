@@ -23,6 +23,7 @@ from markerscope.solver.io.output_folder import remove_if_empty
 from markerscope.solver.pipeline.doubts import assumptions, doubts
 from markerscope.solver.pipeline.look import look_at
 from markerscope.solver.pipeline.methods import GRAPHS, graph_of, spelt_out, with_method
+from markerscope.solver.pipeline.names import CHECK, FIT, MARKERS, ORIENT, SURFACE, SYNC
 from markerscope.solver.pipeline.session import (
     InputFile,
     RunSettings,
@@ -239,8 +240,8 @@ def _tidy(session: Session) -> Iterator[None]:
 
 
 def _outcome(session: Session, graph: GraphRun, not_kept: tuple[str, ...] = ()) -> SolveOutcome:
-    motion, ranked, sync, surface = graph["fit"], graph["orient"], graph["sync"], graph["surface"]
-    markers, found = graph["markers"], graph["check"]
+    motion, ranked, sync, surface = graph[FIT], graph[ORIENT], graph[SYNC], graph[SURFACE]
+    markers, found = graph[MARKERS], graph[CHECK]
     best = ranked.candidates[motion.chosen]
     summary = {
         "out": str(session.folder),

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from markerscope.solver.body.bones import load_body
 from markerscope.solver.core import metrics
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.progress import Progress, part_of, silent
 from markerscope.solver.core.request import EvaluateRequest, Outcome
 from markerscope.solver.core.skeleton import JOINTS
-from markerscope.solver.evaluate.posed import Posed, angles_of, body_of, load_body, measured_markers, posed, times_of
+from markerscope.solver.evaluate.posed import Posed, angles_of, body_of, measured_markers, posed, times_of
 from markerscope.solver.io.motion_in import MotionFile, read_motion
 
 __all__ = [

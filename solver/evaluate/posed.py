@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from markerscope.solver.body.bones import load_body
 from markerscope.solver.body.model import Body
 from markerscope.solver.core import metrics
 from markerscope.solver.core.errors import InputError
@@ -85,13 +86,6 @@ def body_of(path: str | Path) -> Path | None:
     if file is not None and file.digest and file_digest(file.path) != file.digest:
         raise InputError("is not the body any more that the result was solved with", file.path, "solve again")
     return None if file is None else Path(file.path)
-
-
-def load_body(path: Path | None) -> Body:
-    """The body, with bone lengths among its shape coefficients."""
-    from markerscope.solver.body.bones import with_bone_lengths
-
-    return with_bone_lengths(Body.load(path))
 
 
 def posed(motion: MotionFile, time: np.ndarray, body: Body, *, known: bool) -> tuple[Posed, tuple[str, ...]]:

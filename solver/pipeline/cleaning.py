@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
-from markerscope.solver.cleaning.clean import Cleaned, CleanSettings, clean, put_back
+from markerscope.solver.cleaning.clean import Cleaned, CleanSettings, clean
 from markerscope.solver.cleaning.gaps import FillSettings
 from markerscope.solver.cleaning.outliers import OutlierSettings
 from markerscope.solver.cleaning.request import Filling, OutlierMethod
@@ -61,9 +59,8 @@ class CleaningSettings:
         )
 
 
-def clean_markers(given: Mapping[str, Any], settings: CleaningSettings, progress: Progress) -> Cleaned:
+def clean_markers(settings: CleaningSettings, progress: Progress, *, markers: Markers) -> Cleaned:
     """The edits made that the user chose, outliers cut, gaps filled if asked for."""
-    markers: Markers = given["markers"]
     count, frames = len(markers.labels), len(markers.positions)
     edits = [
         *(Proposal("swap", frame, frames - 1, (a, b), 0.0, "") for a, b, frame in settings.swaps),
@@ -78,11 +75,6 @@ def clean_markers(given: Mapping[str, Any], settings: CleaningSettings, progress
     return clean(apply_proposals(markers, edits), settings.plain(), progress)
 
 
-def measured(cleaned: Cleaned) -> Markers:
-    """What was measured and not cut: the markers that a body is fitted to, and that it is judged by."""
-    return put_back(cleaned, outliers=False)
-
-
 def notes_of(cleaned: Cleaned) -> tuple[str, ...]:
     """What a user should know of the cleaning: what was cut, and each edit that is proposed."""
     cut = cleaned.outliers
@@ -92,5 +84,5 @@ def notes_of(cleaned: Cleaned) -> tuple[str, ...]:
 
 def said_cleaning(cleaned: Cleaned) -> str:
     """What was cut, filled and proposed."""
-    cut, filled = len(cleaned.outliers.frame), sum(fill.length for fill in cleaned.fills)
+    cut, filled = len(cleaned.outliers.frame), int(cleaned.filled.sum())
     return f"{cut} samples cut, {filled} filled, {len(cleaned.proposals)} edits of tracks proposed"

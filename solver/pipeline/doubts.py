@@ -5,23 +5,24 @@ from __future__ import annotations
 from markerscope.solver.fit.doubts.doubt import named, plural
 from markerscope.solver.fit.doubts.far import SUSPECT_M
 from markerscope.solver.pipeline.cleaning import notes_of
+from markerscope.solver.pipeline.names import CHECK, CLEAN, FIT, MARKERS, NEUTRAL, PRIOR, SYNC
 from markerscope.solver.pipeline.stage import GraphRun
 
 
 def assumptions(graph: GraphRun) -> tuple[str, ...]:
     """What was assumed while the files were read, and which markers deserve a look."""
-    read = (*graph["markers"].notes, *notes_of(graph["clean"]), *graph["prior"].notes, *graph["neutral"].notes)
+    read = (*graph[MARKERS].notes, *notes_of(graph[CLEAN]), *graph[PRIOR].notes, *graph[NEUTRAL].notes)
     return (*read, *_suspects(graph))
 
 
 def doubts(graph: GraphRun) -> tuple[str, ...]:
     """What speaks against the result."""
-    found = graph["check"].doubts
-    return (*(doubt.sentence for doubt in found), *graph["sync"].notes, *graph["fit"].warnings)
+    found = graph[CHECK].doubts
+    return (*(doubt.sentence for doubt in found), *graph[SYNC].notes, *graph[FIT].warnings)
 
 
 def _suspects(graph: GraphRun) -> tuple[str, ...]:
-    suspect, labels = graph["check"].suspect, graph["markers"].labels
+    suspect, labels = graph[CHECK].suspect, graph[MARKERS].labels
     if not suspect:
         return ()
     return (

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import numpy as np
 
 from markerscope.solver.angles.angles import AngleSettings
+from markerscope.solver.cleaning.clean import Cleaned
 from markerscope.solver.clustering.segment import Segmentation, SegmentSettings
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.core.landmarks import Landmarks
+from markerscope.solver.core.prior import PosePrior
 from markerscope.solver.core.progress import Progress
 from markerscope.solver.fit.doubts.rules import Verdict
 from markerscope.solver.fit.known.neutral import Neutral, NeutralSettings
+from markerscope.solver.fit.published.results import PaperLocalization
 from markerscope.solver.fit.results import FittedMotion, Localization, Orientation
 from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
 from markerscope.solver.fit.surface import SurfaceDistance
-from markerscope.solver.pipeline.cleaning import measured
 from markerscope.solver.pipeline.stage import NoSettings
+from markerscope.solver.sync.offset import Sync
 
 if TYPE_CHECKING:
     from markerscope.solver.body.model import Body
@@ -27,18 +30,29 @@ if TYPE_CHECKING:
     from markerscope.solver.fit.state import Observations
 
 
-def group_markers(given: Mapping[str, Any], settings: SegmentSettings, progress: Progress) -> Segmentation:
+class FittedTo(TypedDict):
+    """What every stage of the fit looks at."""
+
+    clean: Cleaned
+    prior: PosePrior
+    landmarks: Landmarks | None
+    sync: Sync
+    body_file: Path | None
+
+
+def group_markers(settings: SegmentSettings, progress: Progress, *, clean: Cleaned) -> Segmentation:
     """Markers that move together."""
     from markerscope.solver.clustering.segment import segment
 
-    return segment(given["clean"].markers, settings, progress)
+    return segment(clean.markers, settings, progress)
 
 
-def scene(given: Mapping[str, Any]) -> tuple[Body, Observations, Points]:
+def scene(**given: Unpack[FittedTo]) -> tuple[Body, Observations, Points]:
     """The body with free bone lengths, what was observed on the markers' clock, and the landmarks' body points."""
+    from markerscope.solver.body.bones import load_body
     from markerscope.solver.fit.observe import observe
 
-    body, sync, markers = _body(given), given["sync"], measured(given["clean"])
+    body, sync, markers = load_body(given["body_file"]), given["sync"], given["clean"].measured
     seen, points = observe(markers, given["prior"], given["landmarks"], body, sync.offset, sync.rate_ratio)
     return body, seen, points
 
@@ -50,106 +64,144 @@ def _camera(path: Path | None, image_size: tuple[int, int]) -> CameraResult | No
     return None if path is None else resized(read_camera(path), image_size, path)
 
 
-def place_markers(given: Mapping[str, Any], settings: LocalizeSettings, progress: Progress) -> Localization:
+def place_markers(
+    settings: LocalizeSettings,
+    progress: Progress,
+    *,
+    segment: Segmentation,
+    camera_file: Path | None,
+    **given: Unpack[FittedTo],
+) -> Localization:
     """Hypotheses of where on the body the markers sit."""
-    from markerscope.solver.fit.method import localize
+    from markerscope.solver.fit import method
 
-    body, seen, _ = scene(given)
-    left_out = given["segment"].clusters < 0
-    camera = _camera(given["camera_file"], seen.image_size)
-    return localize(body, seen, left_out, settings, camera)
+    body, seen, _ = scene(**given)
+    left_out = segment.clusters < 0
+    camera = _camera(camera_file, seen.image_size)
+    return method.localize(body, seen, left_out, settings, camera)
 
 
-def rank_placements(given: Mapping[str, Any], settings: OrientSettings, progress: Progress) -> Orientation:
+def rank_placements(
+    settings: OrientSettings,
+    progress: Progress,
+    *,
+    localize: Localization,
+    camera_file: Path | None,
+    **given: Unpack[FittedTo],
+) -> Orientation:
     """The hypotheses fitted and ranked."""
-    from markerscope.solver.fit.method import orient
+    from markerscope.solver.fit import method
 
-    body, seen, points = scene(given)
-    camera = _camera(given["camera_file"], seen.image_size)
-    return orient(body, seen, points, given["localize"], settings, camera, progress)
+    body, seen, points = scene(**given)
+    camera = _camera(camera_file, seen.image_size)
+    return method.orient(body, seen, points, localize, settings, camera, progress)
 
 
-def fit_every_frame(given: Mapping[str, Any], settings: FitSettings, progress: Progress) -> FittedMotion:
+def fit_every_frame(
+    settings: FitSettings,
+    progress: Progress,
+    *,
+    localize: Localization,
+    orient: Orientation,
+    **given: Unpack[FittedTo],
+) -> FittedMotion:
     """The chosen answer carried to every frame."""
-    from markerscope.solver.fit.method import fit
+    from markerscope.solver.fit import method
 
-    body, seen, points = scene(given)
+    body, seen, points = scene(**given)
     time = given["clean"].markers.time
-    return fit(body, seen, points, given["localize"], given["orient"], time, settings, progress)
+    return method.fit(body, seen, points, localize, orient, time, settings, progress)
 
 
-def _body(given: Mapping[str, Any]) -> Body:
-    """The body with free bone lengths."""
-    from markerscope.solver.body.bones import with_bone_lengths
-    from markerscope.solver.body.model import Body
-
-    return with_bone_lengths(Body.load(given["body_file"]))
-
-
-def find_neutral(given: Mapping[str, Any], settings: NeutralSettings, progress: Progress) -> Neutral:
+def find_neutral(
+    settings: NeutralSettings,
+    progress: Progress,
+    *,
+    fit: FittedMotion,
+    neutral_file: Path | None,
+    body_file: Path | None,
+) -> Neutral:
     """The pose that angles are counted from, if the user named one."""
-    from markerscope.solver.fit.known.neutral import neutral_file, neutral_span
+    from markerscope.solver.body.bones import load_body
+    from markerscope.solver.fit.known import neutral
     from markerscope.solver.io import load_markers
 
-    path, motion = given["neutral_file"], given["fit"]
-    if path is not None:
-        markers = load_markers(path, up=settings.up, units=settings.units)
-        return neutral_file(_body(given), motion, markers, settings)
+    if neutral_file is not None:
+        markers = load_markers(neutral_file, up=settings.up, units=settings.units)
+        return neutral.neutral_file(load_body(body_file), fit, markers, settings)
     if settings.start is None and settings.stop is None:
         return Neutral()
-    return neutral_span(motion, settings)
+    return neutral.neutral_span(fit, settings)
 
 
-def read_angles(given: Mapping[str, Any], settings: AngleSettings, progress: Progress) -> JointAngles:
+def read_angles(
+    settings: AngleSettings, progress: Progress, *, fit: FittedMotion, neutral: Neutral, body_file: Path | None
+) -> JointAngles:
     """Joint angles of the fitted body, relative to the neutral pose where there is one."""
     from markerscope.solver.angles.angles import joint_angles, relative_to
+    from markerscope.solver.body.bones import load_body
     from markerscope.solver.fit.known.neutral import facing
 
-    body, motion, neutral = _body(given), given["fit"], given["neutral"]
-    shaped = body.landmarks(motion.betas), body.joints(motion.betas)
-    angles = joint_angles(motion.time, motion.rotations, *shaped, settings)
+    body = load_body(body_file)
+    shaped = body.landmarks(fit.betas), body.joints(fit.betas)
+    angles = joint_angles(fit.time, fit.rotations, *shaped, settings)
     if neutral.zero == "recorded":
         return angles
-    zero = joint_angles(motion.time[:1], facing(neutral, motion), *shaped, settings)
+    zero = joint_angles(fit.time[:1], facing(neutral, fit), *shaped, settings)
     return relative_to(angles, zero, neutral.where, neutral.same_lab_heading)
 
 
-def measure_surface(given: Mapping[str, Any], settings: NoSettings, progress: Progress) -> SurfaceDistance:
+def measure_surface(
+    settings: NoSettings, progress: Progress, *, fit: FittedMotion, clean: Cleaned, body_file: Path | None
+) -> SurfaceDistance:
     """How far the markers are from the fitted skin."""
+    from markerscope.solver.body.bones import load_body
     from markerscope.solver.fit.surface import surface_distance
 
-    return surface_distance(_body(given), given["fit"], measured(given["clean"]).positions, progress)
+    return surface_distance(load_body(body_file), fit, clean.measured.positions, progress)
 
 
-def check_result(given: Mapping[str, Any], settings: NoSettings, progress: Progress) -> Verdict:
+def check_result(
+    settings: NoSettings,
+    progress: Progress,
+    *,
+    clean: Cleaned,
+    prior: PosePrior,
+    sync: Sync,
+    segment: Segmentation,
+    localize: Localization | PaperLocalization,
+    orient: Orientation,
+    fit: FittedMotion,
+    surface: SurfaceDistance,
+) -> Verdict:
     """What speaks against the result, by every rule there is."""
     from markerscope.solver.fit.doubts.doubt import Evidence
     from markerscope.solver.fit.doubts.rules import verdict
     from markerscope.solver.fit.observe import on_clock
     from markerscope.solver.sync.offset import lead
 
-    motion, surface, sync, found = given["fit"], given["surface"], given["sync"], given["localize"]
-    ranked: Orientation = given["orient"]
-    video, tracked = on_clock(given["prior"], motion.time, sync.offset, sync.rate_ratio)
-    nothing = np.zeros(0, dtype=int)
+    video, tracked = on_clock(prior, fit.time, sync.offset, sync.rate_ratio)
+    still, cloud, taken = np.zeros(0, dtype=int), np.zeros(0, dtype=int), 0
+    if isinstance(localize, Localization):  # the published method leaves nothing out
+        still, cloud, taken = localize.still, localize.cloud, localize.taken
     evidence = Evidence(
-        labels=given["clean"].markers.labels,
-        joint=motion.marker_joint,
-        residual=motion.residual,
+        labels=clean.markers.labels,
+        joint=fit.marker_joint,
+        residual=fit.residual,
         skin=surface.per_marker,
         m2s=surface.mean,
-        affinity=given["segment"].affinity,
-        rotations=motion.rotations,
+        affinity=segment.affinity,
+        rotations=fit.rotations,
         video=video,
         tracked=tracked,
-        reprojection=motion.camera.reprojection_px,
-        image_size=motion.camera.image_size,
+        reprojection=fit.camera.reprojection_px,
+        image_size=fit.camera.image_size,
         sync_confidence=sync.confidence,
         sync_lead=lead(sync),
-        still=getattr(found, "still", nothing),  # the published method leaves nothing out
-        cloud=getattr(found, "cloud", nothing),
-        taken=getattr(found, "taken", 0),
-        far=ranked.far,
-        mirror=ranked.mirror,
+        still=still,
+        cloud=cloud,
+        taken=taken,
+        far=orient.far,
+        mirror=orient.mirror,
     )
-    return verdict(evidence, motion.confidence)
+    return verdict(evidence, fit.confidence)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
+from markerscope.solver.cleaning.clean import Cleaned
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.landmarks import Landmarks
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.prior import PosePrior
 from markerscope.solver.core.progress import Progress
-from markerscope.solver.pipeline.cleaning import measured
 from markerscope.solver.sync.offset import Sync
 
 _MOSTLY = 0.9
@@ -104,34 +104,35 @@ def _positive(**values: float | None) -> None:
             raise ValueError(f"{name} is {value:g} and has to be above 0")
 
 
-def read_markers(given: Mapping[str, Any], settings: MarkerSettings, progress: Progress) -> Markers:
+def read_markers(settings: MarkerSettings, progress: Progress, *, marker_file: Path) -> Markers:
     """The marker file, or its range, if a solve can do something with it."""
     from markerscope.solver.core.markers_check import require_solvable
     from markerscope.solver.io import load_markers
 
     markers = load_markers(
-        given["marker_file"], up=settings.up, units=settings.units, subject=settings.subject, rate=settings.rate
+        marker_file, up=settings.up, units=settings.units, subject=settings.subject, rate=settings.rate
     )
     markers = markers.between(settings.start, settings.stop)
     require_solvable(markers)
     return markers
 
 
-def watch_video(given: Mapping[str, Any], settings: LandmarkSettings, progress: Progress) -> Landmarks | None:
+def watch_video(settings: LandmarkSettings, progress: Progress, *, video_file: Path | None) -> Landmarks | None:
     """The person's landmarks, left and right put in order; None without a video."""
-    if given["video_file"] is None:
+    if video_file is None:
         return None
     from markerscope.solver.video.blazepose import track_pose
     from markerscope.solver.video.flips import mend_flips
 
-    landmarks = track_pose(given["video_file"], rate=settings.rate, progress=progress)
+    landmarks = track_pose(video_file, rate=settings.rate, progress=progress)
     return mend_flips(landmarks)[0] if settings.mend_flips else landmarks
 
 
-def pose_prior(given: Mapping[str, Any], settings: PriorSettings, progress: Progress) -> PosePrior:
+def pose_prior(
+    settings: PriorSettings, progress: Progress, *, prior_file: Path | None, landmarks: Landmarks | None
+) -> PosePrior:
     """Body poses: another program's, where the user has them, else lifted from the landmarks."""
-    landmarks: Landmarks | None = given["landmarks"]
-    if given["prior_file"] is None:
+    if prior_file is None:
         from markerscope.solver.body.model import Body
         from markerscope.solver.fit.lift import lift
 
@@ -143,7 +144,7 @@ def pose_prior(given: Mapping[str, Any], settings: PriorSettings, progress: Prog
     from markerscope.solver.io.priors import load_prior
 
     video_rate = None if landmarks is None else _video_rate(landmarks)
-    prior = load_prior(given["prior_file"], fps=settings.rate or video_rate)
+    prior = load_prior(prior_file, fps=settings.rate or video_rate)
     if landmarks is None:
         return prior
     lengths = prior.time[-1] - prior.time[0], landmarks.time[-1] - landmarks.time[0]
@@ -163,11 +164,12 @@ def _video_rate(landmarks: Landmarks) -> float | None:
     return float((landmarks.frame[-1] - landmarks.frame[0]) / (landmarks.time[-1] - landmarks.time[0]))
 
 
-def synchronise(given: Mapping[str, Any], settings: SyncSettings, progress: Progress) -> Sync:
+def synchronise(
+    settings: SyncSettings, progress: Progress, *, clean: Cleaned, landmarks: Landmarks | None, prior: PosePrior
+) -> Sync:
     """The clock of the video on the clock of the markers: as given, else found from the motion."""
-    markers: Markers = given["clean"].markers
-    prior: PosePrior = given["prior"]
-    found = _given_offset(settings) or _found_offset(given, settings)
+    markers = clean.markers
+    found = _given_offset(settings) or _found_offset(settings, clean.measured, landmarks, prior)
     in_sight = _in_sight(prior, found, markers)
     if not in_sight:
         start, stop = found.marker_time(prior.time[[0, -1]])
@@ -193,20 +195,20 @@ def _given_offset(settings: SyncSettings) -> Sync | None:
     return Sync(settings.offset, settings.rate_ratio or 1.0, 1.0, lags, score, method="given")
 
 
-def _found_offset(given: Mapping[str, Any], settings: SyncSettings) -> Sync:
+def _found_offset(settings: SyncSettings, markers: Markers, landmarks: Landmarks | None, prior: PosePrior) -> Sync:
     from markerscope.solver.sync.offset import find_offset
 
-    watched = given["landmarks"]
+    watched = landmarks
     if watched is None:
         from markerscope.solver.body.model import Body
         from markerscope.solver.fit.shadow import landmarks_of_prior
 
-        watched = landmarks_of_prior(given["prior"], Body.load())
+        watched = landmarks_of_prior(prior, Body.load())
     window = None if settings.search_s is None else (-settings.search_s, settings.search_s)
     if settings.rate_ratio is None:
-        return find_offset(watched, measured(given["clean"]), search=window)
+        return find_offset(watched, markers, search=window)
     watched = replace(watched, time=watched.time * settings.rate_ratio)
-    found = find_offset(watched, measured(given["clean"]), search=window)
+    found = find_offset(watched, markers, search=window)
     # A ratio that was given stays: where another fits better, the two agree in the middle of the video.
     middle = 0.5 * (watched.time[0] + watched.time[-1])
     return replace(found, rate_ratio=settings.rate_ratio, offset=found.offset + (found.rate_ratio - 1) * middle)

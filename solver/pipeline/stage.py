@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import graphlib
+import inspect
 import time
+import typing
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Generic, Literal, TypeVar, overload
 
 from markerscope.solver.core.errors import Cancelled, InputError
 from markerscope.solver.core.progress import Found, Progress, part_of, silent, tell
@@ -19,6 +21,11 @@ from markerscope.solver.pipeline.source import Source, Touched, Watch, changed
 from markerscope.solver.pipeline.store import Absent, Store
 
 State = Literal["cached", "stale", "not run", "running", "failed"]
+T = TypeVar("T")
+
+
+class StageName(str, Generic[T]):
+    """The name of a stage that leaves a ``T``: what is asked for by it has that type."""
 
 
 @dataclass(frozen=True)
@@ -36,27 +43,57 @@ class Stage:
     version : to be raised when the same settings give another result
     settings : frozen dataclass type of its settings; its defaults are the stage's
     inputs : names of the stages and sources it is computed from
-    run : ``(inputs by name, settings, progress) -> result``; a source arrives as its path (or value)
+    run : ``(settings, progress, *, one parameter for each input) -> result``; a source arrives as its path (or value)
     result : type of the result, a frozen dataclass or an annotation such as ``Landmarks | None``
     headline : one line about a result
     shipped : files of the program itself that it reads: another content makes another result
     cost : how long it takes beside the other stages, in any unit; only the progress bar believes it
+
+    Raises
+    ------
+    TypeError : ``run`` does not take the inputs, or takes others
     """
 
     name: str
     version: int
     settings: type
     inputs: tuple[str, ...]
-    run: Callable[[Mapping[str, Any], Any, Progress], Any]
+    run: Callable[..., Any]
     result: Any
     headline: Callable[[Any], str] = lambda result: ""
     cost: float = 1.0
     shipped: tuple[Path, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Refuse a function of other inputs as soon as the module of the stage is imported."""
+        taken = inputs_of(self.run)
+        if taken is not None and taken != set(self.inputs):
+            raise TypeError(
+                f"stage {self.name} is declared on {sorted(self.inputs)}, its function takes {sorted(taken)}"
+            )
+
     def key(self, settings: Any, inputs: Mapping[str, str]) -> str:
         """Key of its result, from the keys and digests of its inputs."""
         own = {f"shipped {path.name}": _shipped_digest(path) for path in self.shipped}
         return result_key(self.name, self.version, settings, {**inputs, **own})
+
+
+def inputs_of(run: Callable[..., Any]) -> frozenset[str] | None:
+    """The inputs that a stage's function takes, by name, or None if it takes any.
+
+    Those of a TypedDict that it unpacks (``**given: Unpack[Some]``) are among them.
+    """
+    _, _, *own = inspect.signature(run).parameters.values()
+    names: set[str] = set()
+    for parameter in own:
+        if parameter.kind is not inspect.Parameter.VAR_KEYWORD:
+            names.add(parameter.name)
+            continue
+        hint = typing.get_type_hints(run).get(parameter.name)
+        if typing.get_origin(hint) is not typing.Unpack:
+            return None
+        names |= typing.get_args(hint)[0].__annotations__.keys()
+    return frozenset(names)
 
 
 @cache
@@ -98,6 +135,10 @@ class GraphRun:
     events: Mapping[str, Event]
     _value: Callable[[str], Any] = field(repr=False)
 
+    @overload
+    def __getitem__(self, stage: StageName[T]) -> T: ...
+    @overload
+    def __getitem__(self, stage: str) -> Any: ...
     def __getitem__(self, stage: str) -> Any:
         return self._value(stage)
 
@@ -314,7 +355,7 @@ class _Runner:
             report = _Report(progress, stage.name, key, watch, pieces)
             try:
                 report(0.0, stage.name)
-                result = stage.run(inputs, settings, report)
+                result = stage.run(settings, report, **inputs)
                 watch.end()
                 return result
             except Touched:

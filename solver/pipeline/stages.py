@@ -96,7 +96,7 @@ def _said_angles(angles: JointAngles) -> str:
     return f"{len(angles.names)} angles ({angles.title})"
 
 
-FITTED_TO = ("clean", "prior", "landmarks", "sync", "body_file")
+FITTED_TO = (*fitting.FittedTo.__annotations__,)
 """What every stage of the fit looks at."""
 BODY = (EMBEDDED,)
 """Read by every stage that sees a body: a user's own, too, takes its landmarks from the embedded one."""

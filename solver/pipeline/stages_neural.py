@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.progress import Progress, part_of
-from markerscope.solver.fit.results import FittedMotion
+from markerscope.solver.fit.results import FittedMotion, Localization, Orientation
 from markerscope.solver.neural.layout_free.agnostic_fit import NetworkPoses, NeuralFitSettings
-from markerscope.solver.pipeline.fitting import scene as scene_of
+from markerscope.solver.pipeline.fitting import FittedTo, scene
 from markerscope.solver.pipeline.stage import Stage
 from markerscope.solver.pipeline.stages import BODY, FITTED_TO, GRAPH, said_fit
 
@@ -43,26 +43,51 @@ class NetworkSettings:
             raise InputError(f"{self.default_deg} is not possible", "the setting default_deg", "give a number above 0")
 
 
-def ask_network(given: Mapping[str, Any], settings: NetworkSettings, progress: Progress) -> NetworkPoses:
+def ask_network(
+    settings: NetworkSettings,
+    progress: Progress,
+    *,
+    localize: Localization,
+    orient: Orientation,
+    weights_file: Path | None,
+    **given: Unpack[FittedTo],
+) -> NetworkPoses:
     """A network reads the poses off the markers, told where on the body they sit."""
-    return _poses(given, settings, 0, progress)
+    return _poses(settings, progress, 0, localize, orient, weights_file, given)
 
 
-def fit_from_poses(given: Mapping[str, Any], settings: NeuralFitSettings, progress: Progress) -> FittedMotion:
+def fit_from_poses(
+    settings: NeuralFitSettings,
+    progress: Progress,
+    *,
+    localize: Localization,
+    orient: Orientation,
+    network: NetworkPoses,
+    weights_file: Path | None,
+    **given: Unpack[FittedTo],
+) -> FittedMotion:
     """The network's poses refined on the markers in every frame."""
     from markerscope.solver.fit.method import chosen_row
     from markerscope.solver.neural.layout_free.agnostic_fit import fit_from_network
 
-    body, seen, points = scene_of(given)
-    poses: NetworkPoses = given["network"]
-    row = chosen_row(given["orient"], settings)
+    body, seen, points = scene(**given)
+    poses, row = network, chosen_row(orient, settings)
     if row != poses.chosen:
-        poses = _poses(given, NetworkSettings(poses.tuned, poses.default_deg), row, part_of(progress, 0.0, 0.5))
+        again, half = NetworkSettings(poses.tuned, poses.default_deg), part_of(progress, 0.0, 0.5)
+        poses = _poses(again, half, row, localize, orient, weights_file, given)
     time = given["clean"].markers.time
-    return fit_from_network(body, seen, points, given["localize"], given["orient"], poses, time, settings, progress)
+    return fit_from_network(body, seen, points, localize, orient, poses, time, settings, progress)
 
 
-def _poses(given: Mapping[str, Any], settings: NetworkSettings, row: int, progress: Progress) -> NetworkPoses:
+def _poses(
+    settings: NetworkSettings,
+    progress: Progress,
+    row: int,
+    found: Localization,
+    ranked: Orientation,
+    weights_file: Path | None,
+    given: FittedTo,
+) -> NetworkPoses:
     """The network's poses with the markers where a candidate has them, beside the default fit of that candidate."""
     from markerscope.solver.fit.kinematics import Points, Pose, forward, place_points
     from markerscope.solver.fit.method import fit, in_use
@@ -71,10 +96,10 @@ def _poses(given: Mapping[str, Any], settings: NetworkSettings, row: int, progre
     from markerscope.solver.neural.layout_free.agnostic_trust import blended
     from markerscope.solver.neural.posing import pose_network
 
-    body, seen, landmarks = scene_of(given)
-    found, ranked, cleaned = given["localize"], given["orient"], given["clean"].markers
+    body, seen, landmarks = scene(**given)
+    cleaned = given["clean"].markers
     chosen = ranked.candidates[row]
-    network = pose_network(given["weights_file"], body, marked(body, chosen), chosen.vertex)
+    network = pose_network(weights_file, body, marked(body, chosen), chosen.vertex)
     if settings.tune_steps:
         network = network.tuned(settings.tune_steps, part_of(progress, 0.0, 0.8))
     # The network is told where the candidate has the markers, so the fit beside it leaves them there.

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Unpack
 
 from markerscope.solver.clustering.segment import Segmentation, SegmentSettings
 from markerscope.solver.core.progress import Progress
 from markerscope.solver.fit.published.results import PaperLocalization, PaperSolve
 from markerscope.solver.fit.published.settings import PaperFitSettings, PaperLocalizeSettings, PaperSolveSettings
 from markerscope.solver.fit.results import FittedMotion, Orientation
-from markerscope.solver.pipeline.fitting import group_markers
-from markerscope.solver.pipeline.fitting import scene as scene_of
+from markerscope.solver.pipeline.fitting import FittedTo, group_markers, scene
 from markerscope.solver.pipeline.stage import NoSettings, Stage
 from markerscope.solver.pipeline.stages import BODY, FITTED_TO, GRAPH, said_fit, said_orientation, said_segmentation
 
@@ -25,39 +23,57 @@ class PaperSegmentSettings(SegmentSettings):
     far: float = 0.0
 
 
-def find_part(given: Mapping[str, Any], settings: PaperLocalizeSettings, progress: Progress) -> PaperLocalization:
+def find_part(
+    settings: PaperLocalizeSettings, progress: Progress, *, segment: Segmentation, **given: Unpack[FittedTo]
+) -> PaperLocalization:
     """The part of the body that carries the markers."""
     from markerscope.solver.fit.published.localize import localize_paper
 
-    body, seen, _ = scene_of(given)
+    body, seen, _ = scene(**given)
     return localize_paper(
-        body, seen, given["clean"].markers.time, given["segment"].clusters, settings, given["prior"].betas, progress
+        body, seen, given["clean"].markers.time, segment.clusters, settings, given["prior"].betas, progress
     )
 
 
-def solve_stages(given: Mapping[str, Any], settings: PaperSolveSettings, progress: Progress) -> PaperSolve:
+def solve_stages(
+    settings: PaperSolveSettings, progress: Progress, *, localize: PaperLocalization, **given: Unpack[FittedTo]
+) -> PaperSolve:
     """The paper's five stages."""
     from markerscope.solver.fit.published.solve import solve_paper
 
-    body, seen, _ = scene_of(given)
-    return solve_paper(body, seen, given["localize"], settings, given["prior"].betas, progress)
+    body, seen, _ = scene(**given)
+    return solve_paper(body, seen, localize, settings, given["prior"].betas, progress)
 
 
-def rank_yaws(given: Mapping[str, Any], settings: NoSettings, progress: Progress) -> Orientation:
+def rank_yaws(
+    settings: NoSettings,
+    progress: Progress,
+    *,
+    localize: PaperLocalization,
+    solve: PaperSolve,
+    **given: Unpack[FittedTo],
+) -> Orientation:
     """Its yaws and chains as candidates."""
     from markerscope.solver.fit.published.ranking import orientation_of
 
-    body, seen, points = scene_of(given)
-    return orientation_of(body, seen, points, given["localize"], given["solve"])
+    body, seen, points = scene(**given)
+    return orientation_of(body, seen, points, localize, solve)
 
 
-def every_frame(given: Mapping[str, Any], settings: PaperFitSettings, progress: Progress) -> FittedMotion:
+def every_frame(
+    settings: PaperFitSettings,
+    progress: Progress,
+    *,
+    localize: PaperLocalization,
+    solve: PaperSolve,
+    orient: Orientation,
+    **given: Unpack[FittedTo],
+) -> FittedMotion:
     """Its answer at every frame of the markers."""
     from markerscope.solver.fit.published.motion import motion_of
 
-    body, seen, _ = scene_of(given)
-    found, solved, ranked = given["localize"], given["solve"], given["orient"]
-    return motion_of(body, seen, given["clean"].markers.time, found, solved, ranked, settings, progress)
+    body, seen, _ = scene(**given)
+    return motion_of(body, seen, given["clean"].markers.time, localize, solve, orient, settings, progress)
 
 
 def _said_part(found: PaperLocalization) -> str:

@@ -26,9 +26,9 @@ from markerscope.solver.io.camera import write_camera
 from markerscope.solver.io.export_angles import AS_RECORDED
 from markerscope.solver.io.export_smpl import write_smpl_npz
 from markerscope.solver.io.together import together
-from markerscope.solver.pipeline.cleaning import measured
 from markerscope.solver.pipeline.digest import canonical, file_digest
 from markerscope.solver.pipeline.methods import graph_of
+from markerscope.solver.pipeline.names import ANGLES, CLEAN, FIT
 from markerscope.solver.pipeline.session import Session
 from markerscope.solver.pipeline.source import changed
 from markerscope.solver.pipeline.stage import GraphRun
@@ -142,8 +142,7 @@ def _write(
 ) -> tuple[str, ...]:
     """Write the formats into a folder of their own, and say what of the marker file's C3D could not be kept."""
     from markerscope.solver.angles.angles import evidence
-    from markerscope.solver.body.bones import with_bone_lengths
-    from markerscope.solver.body.model import Body
+    from markerscope.solver.body.bones import load_body
     from markerscope.solver.io.c3d_keep import kept_or_plain
     from markerscope.solver.io.export_angles import angles_long_csv, write_angles
     from markerscope.solver.io.export_bvh import write_bvh
@@ -151,9 +150,9 @@ def _write(
     from markerscope.solver.io.export_trc import write_trc
     from markerscope.solver.report.report_of import report_of
 
-    markers, motion, angles = measured(graph["clean"]), graph["fit"], graph["angles"]
+    markers, motion, angles = graph[CLEAN].measured, graph[FIT], graph[ANGLES]
     body_file = session.inputs.get("body_file")
-    body = with_bone_lengths(Body.load(body_file.path if body_file else None))
+    body = load_body(body_file.path if body_file else None)
     if body_file is not None and body_file.digest and file_digest(body_file.path) != body_file.digest:
         raise changed(body_file.path)
     named = labelled(markers, motion)

@@ -16,8 +16,8 @@ from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.skeleton import BONES, JOINTS
 from markerscope.solver.fit.pull.results import EARNED, LandmarkPull, words_of
 from markerscope.solver.fit.results import FittedMotion, Orientation
-from markerscope.solver.pipeline.cleaning import measured
 from markerscope.solver.pipeline.doubts import doubts
+from markerscope.solver.pipeline.names import ANGLES, CHECK, CLEAN, FIT, ORIENT, PRIOR, SEGMENT, SURFACE, SYNC
 from markerscope.solver.pipeline.session import Session
 from markerscope.solver.pipeline.stage import GraphRun
 from markerscope.solver.report.report import write_report
@@ -65,8 +65,8 @@ def report_of(
 
 
 def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str, Any]) -> ReportData:
-    markers, motion, ranked = measured(graph["clean"]), graph["fit"], graph["orient"]
-    notes = {"marker_file": markers.notes, "prior_file": graph["prior"].notes}
+    markers, motion, ranked = graph[CLEAN].measured, graph[FIT], graph[ORIENT]
+    notes = {"marker_file": markers.notes, "prior_file": graph[PRIOR].notes}
     inputs = tuple(
         InputFile(_ROLES.get(name, name), row["file"], row["sha256"], tuple(notes.get(name, ())))
         for name, row in about["inputs"].items()
@@ -88,11 +88,11 @@ def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str,
         headlines=_headlines(graph, motion, ranked),
         warnings=doubts(graph),
         inputs=inputs,
-        groups=_groups(markers, graph["segment"]),
+        groups=_groups(markers, graph[SEGMENT]),
         hypotheses=_hypotheses(ranked, motion),
         margin=ranked.margin,
-        angles=_curves(graph["angles"]),
-        zero_pose=graph["angles"].zero_pose,
+        angles=_curves(graph[ANGLES]),
+        zero_pose=graph[ANGLES].zero_pose,
         residuals=marker_residuals(
             named.labels,
             markers.labels,
@@ -109,11 +109,11 @@ def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str,
 
 
 def _headlines(graph: GraphRun, motion: FittedMotion, ranked: Orientation) -> tuple[Headline, ...]:
-    sync, surface = graph["sync"], graph["surface"]
+    sync, surface = graph[SYNC], graph[SURFACE]
     margin = f"next answer costs {ranked.margin:.2f} times" if np.isfinite(ranked.margin) else "no other answer found"
     camera = motion.camera
     rows = [
-        Headline("Confidence", f"{100 * graph['check'].confidence:.0f} %", margin),
+        Headline("Confidence", f"{100 * graph[CHECK].confidence:.0f} %", margin),
         Headline("Marker residual", f"{1000 * np.nanmedian(motion.residual):.1f} mm", "median distance from its place"),
         Headline("Marker to skin", f"{1000 * surface.mean:.1f} mm", "mean; a marker's centre stands some 9.5 mm off"),
         Headline(

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from markerscope.solver import __version__
-from markerscope.solver.body.bones import with_bone_lengths
+from markerscope.solver.body.bones import load_body
 from markerscope.solver.body.model import Body
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.plain import json_text
@@ -75,7 +75,7 @@ def _write(folder: Path, session: SynthSession) -> None:
 
 def _write_reference(path: Path, truth: Truth) -> None:
     """The true motion in AMASS layout, on the embedded body in the shape that comes nearest to the true one."""
-    plain = with_bone_lengths(Body.load())
+    plain = load_body()
     shape = nearest_shape(plain, truth)
     motion = truth.motion
     # The root joint of the nearest body is elsewhere at rest; where it is in the lab is what has to agree.

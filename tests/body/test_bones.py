@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from markerscope.solver.body.bones import MODES, BoneMode, with_bone_lengths
+from markerscope.solver.body.bones import MODES, BoneMode, load_body, with_bone_lengths
 from markerscope.solver.body.model import Body
 from markerscope.solver.core.skeleton import INDEX, JOINTS, descendants, mirror_index
 
@@ -60,3 +62,16 @@ def test_both_sides_grow_alike(bodies: tuple[Body, Body]) -> None:
     for mode in MODES:
         _, joints = unit(bodies, mode)
         np.testing.assert_allclose(joints[mirror_index()], joints * [-1, 1, 1], atol=2e-4, err_msg=mode.name)
+
+
+def test_a_body_to_be_fitted_is_loaded_in_one_place(bodies: tuple[Body, Body]) -> None:
+    own, longer = bodies
+    assert load_body().shape_count == longer.shape_count == own.shape_count + len(MODES)
+    root = Path(__file__).parents[2]
+    copies = [
+        str(path.relative_to(root))
+        for room in ("app", "benchmarks", "resources", "solver", "tools", "widgets")
+        for path in (root / room).rglob("*.py")
+        if "with_bone_lengths(Body.load(" in path.read_text(encoding="utf-8") and path.name != "bones.py"
+    ]
+    assert copies == []

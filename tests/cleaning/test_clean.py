@@ -17,7 +17,7 @@ from markerscope.solver.cleaning.swaps import Proposal, apply_proposals, find_pr
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.progress import silent
-from markerscope.solver.pipeline.cleaning import CleaningSettings, clean_markers, measured
+from markerscope.solver.pipeline.cleaning import CleaningSettings, clean_markers
 from markerscope.solver.pipeline.codec import decode, encode
 from tests.cleaning.scenes import RATE, lose, rigid
 
@@ -174,11 +174,11 @@ def test_a_track_that_broke_in_three_is_joined() -> None:
 def test_edits_by_hand_are_made_before_the_cleaning_and_unknown_markers_refused() -> None:
     truth = crossing()
     given = apply_proposals(truth, [Proposal("swap", 40, 119, (0, 1), 0.0, "")])
-    cleaned = clean_markers({"markers": given}, CleaningSettings(swaps=((0, 1, 40),)), silent)
-    assert np.array_equal(measured(cleaned).positions, truth.positions)
+    cleaned = clean_markers(CleaningSettings(swaps=((0, 1, 40),)), silent, markers=given)
+    assert np.array_equal(cleaned.measured.positions, truth.positions)
     assert not cleaned.proposals
     with pytest.raises(InputError, match="there is no marker 9"):
-        clean_markers({"markers": given}, CleaningSettings(keep=((9, 0, 1),)), silent)
+        clean_markers(CleaningSettings(keep=((9, 0, 1),)), silent, markers=given)
 
 
 def test_a_join_that_is_accepted_in_a_session_is_filled_well() -> None:
@@ -188,11 +188,11 @@ def test_a_join_that_is_accepted_in_a_session_is_filled_well() -> None:
     pieces[110:, 8], pieces[100:, 2] = truth[110:, 2], np.nan
     given = of(pieces)
     fill = CleaningSettings(fill="regression", max_gap=0.5)
-    before = clean_markers({"markers": given}, fill, silent)
+    before = clean_markers(fill, silent, markers=given)
     assert np.isnan(before.markers.positions[100:, 2]).all(), "half a trial is no gap to be filled"
     (edit,) = before.proposals
     joined = replace(fill, joins=((*edit.markers, edit.frame, edit.last),))
-    after = clean_markers({"markers": given}, joined, silent)
+    after = clean_markers(joined, silent, markers=given)
     assert [(f.marker, f.first, f.last) for f in after.fills] == [(2, 100, 109)]
     off = np.linalg.norm(after.markers.positions[:, :8] - truth, axis=2).max()
     assert off < 1e-6, f"{1e3 * off:.4f} mm"
@@ -211,9 +211,21 @@ def test_a_marker_that_is_another_after_the_gap_is_not_filled() -> None:
 
 def test_what_the_stage_fills_counts_as_measured_nowhere() -> None:
     markers = damaged()
-    cleaned = clean_markers({"markers": markers}, CleaningSettings(fill="regression"), silent)
+    cleaned = clean_markers(CleaningSettings(fill="regression"), silent, markers=markers)
     assert np.isfinite(cleaned.markers.positions[30:61, 1]).all()
-    seen = measured(cleaned).present
+    seen = cleaned.measured.present
     assert not seen[30:61, 1].any()
     assert not seen[80, 3]
     assert (seen | ~markers.present | cleaned.outliers.mask(seen.shape)).all()
+    assert np.array_equal(cleaned.filled, cleaned.markers.present & ~seen)
+    assert cleaned.filled.sum() == sum(fill.length for fill in cleaned.fills)
+
+
+def test_what_the_file_had_as_filled_is_not_taken_out_with_what_was_filled_here() -> None:
+    already = np.zeros(damaged().present.shape, dtype=bool)
+    already[5, 2] = True
+    cleaned = clean(replace(damaged(), filled=already))
+    measured = cleaned.measured
+    assert cleaned.filled[30, 1] and not cleaned.filled[5, 2]
+    assert measured.filled is not None and measured.filled[5, 2] and measured.filled.sum() == 1
+    assert measured.present[5, 2] and not measured.present[30, 1]

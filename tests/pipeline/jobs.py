@@ -44,11 +44,11 @@ def unsendable(*, progress: Any, on_event: Any) -> Any:
     return lambda: None
 
 
-def quick(inputs: Any, settings: Any, progress: Any) -> int:
+def quick(settings: Any, progress: Any, *, file: Any) -> int:
     return 1
 
 
-def endless(inputs: Any, settings: Any, progress: Any) -> int:
+def endless(settings: Any, progress: Any, *, quick: int) -> int:
     while True:
         progress(0.5, "waiting to be ended")
         time.sleep(0.01)

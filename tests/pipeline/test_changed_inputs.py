@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +65,7 @@ class Reading:
         self.ran = 0
         self.given = {source: Source.file(self.path)}
 
-    def run(self, given: Mapping[str, Any], settings: Any, progress: Progress) -> str:
+    def run(self, settings: Any, progress: Progress, **given: Any) -> str:
         self.ran += 1
         self.before()
         content = given[self.source].read_bytes()
@@ -128,9 +128,9 @@ def test_a_long_reading_is_ended_at_once(tmp_path: Path, monkeypatch: pytest.Mon
     reading.after = lambda: replaced(reading.path, WRONG)
     ended = False
 
-    def run(given: Mapping[str, Any], settings: Any, progress: Progress) -> str:
+    def run(settings: Any, progress: Progress, **given: Any) -> str:
         nonlocal ended
-        reading.run(given, settings, progress)
+        reading.run(settings, progress, **given)
         ended = True
         return ""
 

@@ -42,7 +42,7 @@ class SyncSettings:
     limit: float | None = 3.0
 
 
-GRAPH = (Stage("sync", 1, SyncSettings, (), lambda i, s, p: None, None),)
+GRAPH = (Stage("sync", 1, SyncSettings, (), lambda s, p: None, None),)
 
 settings = st.builds(
     SyncSettings,

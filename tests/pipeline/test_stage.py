@@ -47,7 +47,7 @@ class Work:
         return values if inputs["extra"] is None else values + float(inputs["extra"].read_text())
 
     def stage(self, name: str, inputs: tuple[str, ...], function: Any, settings: type = NoSettings) -> Stage:
-        def run(given: Mapping[str, Any], chosen: Any, progress: Any) -> Numbers:
+        def run(chosen: Any, progress: Any, **given: Any) -> Numbers:
             self.ran.append(name)
             assert set(given) == set(inputs)
             progress(0.5, f"half of {name}")
@@ -154,7 +154,7 @@ def test_progress_rises_to_one_by_the_cost_of_what_must_run(work: Work) -> None:
 
 
 def failing(error: BaseException) -> Any:
-    def run(inputs: Any, settings: Any, progress: Any) -> Any:
+    def run(settings: Any, progress: Any, **inputs: Any) -> Any:
         raise error
 
     return run
@@ -197,7 +197,7 @@ def test_what_a_stage_finds_on_the_way_arrives_with_its_name_and_key(tmp_path: P
         def found(self, found: Found) -> None:
             heard.append(found)
 
-    def run(given: Mapping[str, Any], chosen: Any, progress: Any) -> Numbers:
+    def run(chosen: Any, progress: Any, **given: Any) -> Numbers:
         tell(part_of(part_of(progress, 0.0, 0.5), 0.2, 0.4), Found("candidate", 3, {"energy": 1.5}))
         return Numbers(np.zeros(1))
 

@@ -39,7 +39,7 @@ def ranked(results: Mapping[str, Any]) -> tuple[Orientation, list[Found]]:
     listener = Listener()
     stage = next(stage for stage in GRAPH if stage.name == "orient")
     given = {name: None if name in SOURCES else results[name] for name in stage.inputs}
-    return stage.run(given, OrientSettings(refine=2), listener), listener.notes
+    return stage.run(OrientSettings(refine=2), listener, **given), listener.notes
 
 
 def test_the_last_word_on_every_candidate_is_its_result(
