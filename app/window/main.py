@@ -148,11 +148,12 @@ class MainWindow(QMainWindow):
     def _bind(self) -> None:
         bench, shown, ghosts = self.bench, self.shown, self.ghosts
         self.scene_binder = scene = SceneBinder(self.scene, bench, shown, ghosts)
+        self.video_binder = VideoBinder(self.video, bench, shown)
         self.scene_menu = SceneMenu(self.scene, bench, shown, self.table)
         self.binders = [
             scene,
             SceneBarBinder(self.scene_bar, self.scene, bench, self.table),
-            VideoBinder(self.video, bench, shown),
+            self.video_binder,
             TimelinesBinder(self.timelines, bench, shown, ghosts, self.table),
             StagesBinder(self.stages, self.progress, bench, self.table),
             TransportBinder(self.transport, bench, self.table),
@@ -187,6 +188,11 @@ class MainWindow(QMainWindow):
     def layout_anew(self) -> None:
         """Put every panel back in its first place."""
         self.docks.arrange()
+
+    def draw_now(self) -> None:
+        """Have scene and video show all that has changed: a picture of them is about to be taken."""
+        self.scene_binder.drawing.now()
+        self.video_binder.drawing.now()
 
     def redraw(self) -> None:
         """Draw everything again, in other colours."""
