@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 from markerscope.app.models.signal import Signal
 from markerscope.app.models.workbench import Said, Workbench
@@ -93,6 +93,28 @@ class Action:
         return tuple(self.shortcut.split())
 
 
+Given = TypeVar("Given")
+
+
+@dataclass(frozen=True)
+class ActionWith(Generic[Given]):
+    """Something that the user does to one thing: a row, a stage, a value that was dragged.
+
+    No menu can hold it, since it needs to be told of what; the views do it, and ask beforehand whether it can be done.
+
+    Attributes
+    ----------
+    id, title : as of ``Action``
+    run : does it to what is given
+    why_not : why it cannot be done to that now, a clause; empty if it can
+    """
+
+    id: str
+    title: str
+    run: Callable[[Workbench, Asks, Given], object]
+    why_not: Callable[[Workbench, Given], str] = lambda bench, given: ""
+
+
 class Actions:
     """All actions of a window.
 
@@ -126,10 +148,23 @@ class Actions:
     def trigger(self, name: str) -> bool:
         """Do it; where it cannot be done, the user is told why. Returns whether it was done."""
         action = self.table[name]
-        if reason := action.why_not(self._bench):
-            self._bench.say(Said("note", reason, action.title.rstrip(".")))
+        reason = action.why_not(self._bench)
+        return self._do(name, action.title, reason, lambda: action.run(self._bench, self._asks))
+
+    def why_not_with(self, action: ActionWith[Given], given: Given) -> str:
+        """Why an action cannot be done to what is given; empty if it can."""
+        return action.why_not(self._bench, given)
+
+    def do(self, action: ActionWith[Given], given: Given) -> bool:
+        """Do an action to what is given; where it cannot be done, the user is told why. Returns whether it was done."""
+        reason = action.why_not(self._bench, given)
+        return self._do(action.id, action.title, reason, lambda: action.run(self._bench, self._asks, given))
+
+    def _do(self, name: str, title: str, reason: str, run: Callable[[], object]) -> bool:
+        if reason:
+            self._bench.say(Said("note", reason, title.rstrip(".")))
             return False
-        done = self._bench.attempt(lambda: action.run(self._bench, self._asks))
+        done = self._bench.attempt(run)
         if done:
             self.done.emit(name)
         return done
@@ -151,6 +186,11 @@ def first(*reasons: Reason) -> Reason:
 def needs_session(bench: Workbench) -> str:
     """A session has to be open."""
     return "" if bench.document.is_open else "no session is open"
+
+
+def or_without(*reasons: Reason) -> Callable[[Workbench, Any], str]:
+    """The first reason of several that holds whatever is given."""
+    return lambda bench, given: first(*reasons)(bench)
 
 
 def needs_idle(bench: Workbench) -> str:

@@ -1,27 +1,21 @@
-"""Decisions: undo and redo, groups of markers, the pinned candidate, the offset, the range."""
+"""Decisions: undo and redo, what is selected, settings, earlier results, the offset, the range."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from markerscope.app.actions.action import Action, Asks, Reason, first, needs, needs_idle, needs_session
-from markerscope.app.actions.run_actions import run_until
-from markerscope.app.models import edits, group_edits
-from markerscope.app.models.edits import Edit
+from markerscope.app.actions.action import Action, ActionWith, Asks, first, needs, needs_session, or_without
+from markerscope.app.actions.candidate_actions import CANDIDATE_ACTIONS
+from markerscope.app.actions.group_actions import GROUP_ACTIONS, needs_groups, none_selected
+from markerscope.app.actions.run_actions import run_stage
+from markerscope.app.models import edits
+from markerscope.app.models.offsets import found_sync
+from markerscope.app.models.results import Ref
 from markerscope.app.models.workbench import Workbench
-from markerscope.solver.fit.results import Localization
-from markerscope.solver.pipeline.names import LOCALIZE, MARKERS, SEGMENT
-
-_needs_groups = needs("segment", "the groups of markers are not there")
-
-
-def _selected(count: int, what: str) -> Reason:
-    def why_not(bench: Workbench) -> str:
-        return "" if len(bench.selection.markers) >= count else what
-
-    return why_not
 
 
 def _undo(bench: Workbench, asks: Asks) -> None:
@@ -45,117 +39,33 @@ def _nothing_redone(bench: Workbench) -> str:
 
 
 def _all(bench: Workbench, asks: Asks) -> None:
-    bench.selection.select_markers(range(len(bench.board.current[MARKERS].labels)))
+    bench.selection.select_markers(range(len(bench.board.current["markers"].labels)))
 
 
 def _none(bench: Workbench, asks: Asks) -> None:
     bench.selection.clear()
 
 
+def _all_selected(bench: Workbench) -> str:
+    every = len(bench.selection.markers) == len(bench.board.current["markers"].labels)
+    return "all markers are selected already" if every else ""
+
+
+def _nothing_selected(bench: Workbench) -> str:
+    chosen = bench.selection
+    some = chosen.markers or chosen.bone is not None
+    single = (chosen.candidate, chosen.hypothesis, chosen.iteration) != (None, None, None)
+    return "" if some or single else "nothing is selected"
+
+
 def _invert(bench: Workbench, asks: Asks) -> None:
-    bench.selection.select_markers(range(len(bench.board.current[MARKERS].labels)), "toggle")
+    bench.selection.select_markers(range(len(bench.board.current["markers"].labels)), "toggle")
 
 
 def _whole_groups(bench: Workbench, asks: Asks) -> None:
-    groups = bench.board.current[SEGMENT].clusters
+    groups = bench.board.current["segment"].clusters
     touched = {int(groups[m]) for m in bench.selection.markers} - {-1}
     bench.selection.select_markers(np.flatnonzero(np.isin(groups, list(touched))), "add")
-
-
-GroupEdit = Callable[..., Edit]
-
-
-def _group(edit: GroupEdit) -> Callable[[Workbench, Asks], object]:
-    def run(bench: Workbench, asks: Asks) -> None:
-        found = bench.board.current[SEGMENT]
-        labels = bench.board.current[MARKERS].labels
-        bench.document.apply(edit(bench.document.session, found, bench.selection.markers, labels))
-
-    return run
-
-
-def _move(bench: Workbench, asks: Asks) -> None:
-    found = bench.board.current[SEGMENT]
-    labels, chosen = bench.board.current[MARKERS].labels, bench.selection.markers
-    own = {int(found.clusters[m]) for m in chosen}
-    targets = [k for k in range(found.count) if own != {k}]
-    members = {k: [labels[m] for m in np.flatnonzero(found.clusters == k)] for k in targets}
-    options = [f"Group {k + 1}: {', '.join(members[k][:4])}{' …' if len(members[k]) > 4 else ''}" for k in targets]
-    place = asks.choice("Move the selected markers to", options)
-    if place is not None:
-        host = int(np.flatnonzero(found.clusters == targets[place])[0])
-        bench.document.apply(group_edits.move(bench.document.session, found, chosen, host, labels))
-
-
-def _take_in(bench: Workbench, asks: Asks) -> None:
-    labels = bench.board.current[MARKERS].labels
-    bench.document.apply(group_edits.take_in(bench.document.session, bench.selection.markers, labels))
-
-
-def _as_cut(bench: Workbench, asks: Asks) -> None:
-    bench.document.apply(group_edits.undo_all(bench.document.session))
-
-
-def _pin(bench: Workbench, asks: Asks) -> None:
-    row = bench.selection.candidate
-    assert row is not None
-    bench.document.apply(edits.pin_candidate(bench.document.session, row))
-
-
-def _no_candidate(bench: Workbench) -> str:
-    if reason := needs("orient", "there are no ranked candidates")(bench):
-        return reason
-    return "" if bench.selection.candidate is not None else "no candidate is selected"
-
-
-def _leave_ghosts(bench: Workbench, asks: Asks) -> None:
-    bench.selection.select(iteration=None, candidate=None, hypothesis=None)
-
-
-def _no_ghost(bench: Workbench) -> str:
-    chosen = bench.selection
-    shown = (chosen.iteration, chosen.candidate, chosen.hypothesis) != (None, None, None)
-    return "" if shown else "the fit is shown as it is"
-
-
-def _pin_and_run(bench: Workbench, asks: Asks) -> None:
-    _pin(bench, asks)
-    run_until(bench, None)
-
-
-def _unpin(bench: Workbench, asks: Asks) -> None:
-    bench.document.apply(edits.unpin_candidate(bench.document.session))
-
-
-def _not_pinned(bench: Workbench) -> str:
-    if reason := needs_session(bench):
-        return reason
-    return "" if getattr(bench.board.settings.get("fit"), "candidate", None) is not None else "no candidate is pinned"
-
-
-def _clouds(bench: Workbench) -> np.ndarray:
-    """(M,) number of the cloud that each marker belongs to; (0,) where the method makes out none."""
-    found = bench.board.current[LOCALIZE]
-    return found.cloud if isinstance(found, Localization) else np.zeros(0, dtype=int)
-
-
-def _cloud(bench: Workbench, asks: Asks) -> None:
-    cloud, labels = _clouds(bench), bench.board.current[MARKERS].labels
-    sizes = np.bincount(cloud[cloud >= 0])
-    members = [[labels[m] for m in np.flatnonzero(cloud == c)] for c in range(len(sizes))]
-    options = [
-        f"Cloud {c + 1}, {len(own)} markers: {', '.join(own[:4])}{' …' if len(own) > 4 else ''}"
-        for c, own in enumerate(members)
-    ]
-    place = asks.choice("Solve the markers of", options)
-    if place is not None:
-        bench.document.apply(edits.choose_cloud(bench.document.session, place + 1))
-
-
-def _one_cloud(bench: Workbench) -> str:
-    if reason := needs("localize", "the markers have not been placed yet")(bench):
-        return reason
-    return "" if _clouds(bench).max(initial=0) > 0 else "the markers form one cloud"
 
 
 def _found_offset(bench: Workbench, asks: Asks) -> None:
@@ -190,15 +100,111 @@ def _no_range(bench: Workbench) -> str:
     return "" if (settings.start, settings.stop) != (None, None) else "the whole recording is solved already"
 
 
-_ONE = _selected(1, "no marker is selected")
-_TWO = _selected(2, "fewer than two markers are selected")
 _MARKERS = needs("markers", "the markers have not been read")
+
+
+@dataclass(frozen=True)
+class Value:
+    """A setting of a stage and the value it is to have, as its form shows it; None leaves it to the program."""
+
+    stage: str
+    name: str
+    value: Any
+
+
+def _set_value(bench: Workbench, asks: Asks, given: Value) -> None:
+    bench.document.apply(edits.set_value(bench.document.session, given.stage, given.name, given.value))
+
+
+def _no_setting(bench: Workbench, given: Value) -> str:
+    if reason := needs_session(bench):
+        return reason
+    known = hasattr(bench.board.settings.get(given.stage), given.name)
+    return "" if known else "the method has no such setting"
+
+
+def _set_offset(bench: Workbench, asks: Asks, offset: float) -> None:
+    session, found = bench.document.session, found_sync(bench.board)
+    automatic = found is not None and found.offset == offset  # which is no number that was given
+    bench.document.apply(edits.find_offset(session) if automatic else edits.set_offset(session, offset))
+
+
+def _tell_angles(bench: Workbench, asks: Asks, convention: str) -> None:
+    """Tell the angles by another convention, at once where there is a fit to tell them of."""
+    _set_value(bench, asks, Value("angles", "convention", convention))
+    if "fit" in bench.board.current and "angles" not in bench.board.current and not bench.runner.running:
+        run_stage(bench, "angles")
+
+
+def _no_step(bench: Workbench, position: int) -> str:
+    if reason := needs_session(bench):
+        return reason
+    return "" if 0 <= position < len(bench.document.history.steps) else "there is no such step any more"
+
+
+def _not_in_store(bench: Workbench, ref: Ref) -> str:
+    if reason := needs_session(bench):
+        return reason
+    return "" if bench.board.results.has(ref.stage, ref.key) else "the result is not in the store any more"
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A result, and whether it is to be shown beside the one in force."""
+
+    ref: Ref
+    on: bool
+
+
+@dataclass(frozen=True)
+class GivenFile:
+    """An input of the session by its name, and the file it is to be; None for none."""
+
+    name: str
+    path: Path | None
+
+
+SET_VALUE: ActionWith[Value] = ActionWith("setting.set", "Settings", _set_value, _no_setting)
+TELL_ANGLES: ActionWith[str] = ActionWith(
+    "angles.convention", "Convention of the angles", _tell_angles, or_without(needs_session)
+)
+SET_OFFSET: ActionWith[float] = ActionWith("offset.set", "Offset of the video", _set_offset, or_without(needs_session))
+GIVE_INPUT: ActionWith[GivenFile] = ActionWith(
+    "input.give",
+    "Use a file",
+    lambda bench, asks, given: bench.document.apply(edits.set_input(bench.document.session, given.name, given.path)),
+    or_without(needs_session),
+)
+GO_BACK: ActionWith[Ref] = ActionWith(
+    "result.use",
+    "Use an earlier result",
+    lambda bench, asks, ref: bench.document.apply(bench.board.go_back(ref.stage, ref.key)),
+    _not_in_store,
+)
+COMPARE: ActionWith[Compared] = ActionWith(
+    "result.compare",
+    "Compare",
+    lambda bench, asks, given: bench.board.compare(given.ref.stage, given.ref.key, given.on),
+    lambda bench, given: _not_in_store(bench, given.ref) if given.on else needs_session(bench),
+)
+GO_TO_STEP: ActionWith[int] = ActionWith(
+    "history.go", "History", lambda bench, asks, position: bench.document.go_to(position), _no_step
+)
+EDITS_WITH = (SET_VALUE, TELL_ANGLES, SET_OFFSET, GIVE_INPUT, GO_BACK, COMPARE, GO_TO_STEP)
 
 EDIT_ACTIONS = (
     Action("edit.undo", "Undo", "Edit", "Take the last decision back.", _undo, "Ctrl+Z", _nothing_undone),
     Action("edit.redo", "Redo", "Edit", "Decide again what was undone.", _redo, "Ctrl+Shift+Z Ctrl+Y", _nothing_redone),
-    Action("select.all", "Select all markers", "Edit", "Select every marker.", _all, "Ctrl+A", _MARKERS),
-    Action("select.none", "Select nothing", "Edit", "Let go of the selection.", _none, "Esc"),
+    Action(
+        "select.all",
+        "Select all markers",
+        "Edit",
+        "Select every marker.",
+        _all,
+        "Ctrl+A",
+        first(_MARKERS, _all_selected),
+    ),
+    Action("select.none", "Select nothing", "Edit", "Let go of the selection.", _none, "Esc", _nothing_selected),
     Action("select.invert", "Invert selection", "Edit", "Select the other markers.", _invert, "Ctrl+I", _MARKERS),
     Action(
         "select.groups",
@@ -207,89 +213,10 @@ EDIT_ACTIONS = (
         "Select all markers of the groups that selected markers belong to.",
         _whole_groups,
         "G",
-        first(_needs_groups, _ONE),
+        first(needs_groups, none_selected),
     ),
-    Action(
-        "groups.merge",
-        "Merge groups",
-        "Edit",
-        "Make one group of the groups of the selected markers.",
-        _group(group_edits.merge),
-        "M",
-        first(_needs_groups, _TWO),
-    ),
-    Action(
-        "groups.split",
-        "Split off",
-        "Edit",
-        "Give the selected markers a group of their own.",
-        _group(group_edits.split),
-        "S",
-        first(_needs_groups, _ONE),
-    ),
-    Action(
-        "groups.move",
-        "Move to group...",
-        "Edit",
-        "Put the selected markers into another group.",
-        _move,
-        "Shift+M",
-        first(_needs_groups, _ONE),
-    ),
-    Action(
-        "groups.leave_out",
-        "Leave out",
-        "Edit",
-        "Leave the selected markers out of the solve.",
-        _group(group_edits.leave_out),
-        "Del",
-        first(_needs_groups, _ONE),
-    ),
-    Action(
-        "groups.take_in",
-        "Put back in",
-        "Edit",
-        "Have selected markers back that were left out.",
-        _take_in,
-        "Shift+Del",
-        first(_needs_groups, _ONE),
-    ),
-    Action(
-        "groups.as_cut",
-        "Groups as the cut makes them",
-        "Edit",
-        "Take back every merge, split, move and marker left out.",
-        _as_cut,
-        why_not=_needs_groups,
-    ),
-    Action("candidate.pin", "Pin candidate", "Edit", "Go on from the selected candidate.", _pin, "P", _no_candidate),
-    Action(
-        "candidate.pin_run",
-        "Pin candidate and run on",
-        "Edit",
-        "Go on from the selected candidate, and compute what follows from it at once.",
-        _pin_and_run,
-        "Shift+P",
-        first(_no_candidate, needs_idle),
-    ),
-    Action("candidate.unpin", "Unpin candidate", "Edit", "Go on from the best candidate.", _unpin, "", _not_pinned),
-    Action(
-        "ghosts.leave",
-        "Back to the fit",
-        "View",
-        "Show the fitted body alone again: no candidate, no hypothesis, no iteration on the way to it.",
-        _leave_ghosts,
-        "Shift+Esc",
-        _no_ghost,
-    ),
-    Action(
-        "cloud.choose",
-        "Solve another cloud of markers...",
-        "Edit",
-        "Where the markers form several clouds (two people in one file), choose the one that is solved.",
-        _cloud,
-        why_not=_one_cloud,
-    ),
+    *GROUP_ACTIONS,
+    *CANDIDATE_ACTIONS,
     Action(
         "offset.found",
         "Use the offset found",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from markerscope.app.actions.action import Action, Asks, first, needs_idle, needs_session
+from markerscope.app.actions.action import Action, ActionWith, Asks, first, needs_idle, needs_session
 from markerscope.app.models import edits
 from markerscope.app.models.fields import title
 from markerscope.app.models.workbench import Said, Workbench
@@ -59,10 +59,32 @@ def _method(method: Method, name: str, help: str) -> Action:
     def on(bench: Workbench) -> bool:
         return bench.document.is_open and bench.document.session.run.method == method
 
-    return Action(f"method.{method}", name, "Run", help, run, why_not=needs_session, checked=on)
+    def why_not(bench: Workbench) -> str:
+        return needs_session(bench) or ("it is the session's method already" if on(bench) else "")
+
+    return Action(f"method.{method}", name, "Run", help, run, why_not=why_not, checked=on)
 
 
 _READY = first(needs_session, needs_idle, _problem)
+
+
+def _not_to_run(bench: Workbench, stage: str) -> str:
+    return _READY(bench) or ("" if stage in bench.board.names else "the method has no such stage")
+
+
+def _at(bench: Workbench, stage: str) -> str:
+    """The stage, with its card beside what comes of it."""
+    bench.selection.select(stage=stage)
+    return stage
+
+
+RUN_STAGE: ActionWith[str] = ActionWith(
+    "run.one", "Run", lambda bench, asks, stage: run_stage(bench, _at(bench, stage)), _not_to_run
+)
+RUN_TO: ActionWith[str] = ActionWith(
+    "run.down_to", "Run to here", lambda bench, asks, stage: run_until(bench, _at(bench, stage)), _not_to_run
+)
+RUNS_WITH = (RUN_STAGE, RUN_TO)
 
 RUN_ACTIONS = (
     Action("run.all", "Run all", "Run", "Have every result for the settings as they are.", _all, "F5 Ctrl+R", _READY),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from markerscope.app.actions.action import Action, Asks, first, needs_idle, needs_session
+from markerscope.app.actions.action import Action, ActionWith, Asks, first, needs_idle, needs_session
 from markerscope.app.models import edits, exports
 from markerscope.app.models.demo import DEMO_MARKERS, DEMO_VIDEO
 from markerscope.app.models.workbench import Said, Workbench
@@ -51,6 +51,11 @@ def _open_session(bench: Workbench, asks: Asks) -> None:
         open_path(bench, asks, path)
 
 
+OPEN: ActionWith[Path] = ActionWith("session.open_path", "Open", open_path)
+"""Open a session or a marker file that was dropped, is recent, or was named on the command line."""
+SESSIONS_WITH = (OPEN,)
+
+
 def open_example(bench: Workbench, asks: Asks) -> None:
     """Begin a session from the embedded recording."""
     if may_close(bench, asks):
@@ -61,10 +66,13 @@ def _save(bench: Workbench, asks: Asks) -> bool:
     bench.remember()
     if bench.document.untitled:
         return _save_as(bench, asks)
+    news = bench.document.dirty
     try:
         bench.document.save()
     except EditedOutside as error:
         return _settle(bench, asks, error)
+    if not news:
+        bench.say(Said("note", "There was nothing new to save", bench.document.name))
     return True
 
 

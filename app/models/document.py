@@ -14,20 +14,12 @@ from typing import Any
 from markerscope.app.models.edits import Edit, existing
 from markerscope.app.models.history import History, Step
 from markerscope.app.models.home import Home
-from markerscope.app.models.journal import (
-    IN_FORCE,
-    JOURNAL,
-    VIEW,
-    Writer,
-    journal_of,
-    read_answers,
-    read_journal,
-    read_view,
-)
+from markerscope.app.models.journal import JOURNAL, VIEW, Writer, journal_of, read_journal, read_view
 from markerscope.app.models.keep import kept_decisions
 from markerscope.app.models.signal import Signal
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.io.atomic import cannot_write, make_folder
+from markerscope.solver.pipeline.in_force import IN_FORCE, read_answers
 from markerscope.solver.pipeline.look import look_at
 from markerscope.solver.pipeline.methods import graph_of, spelt_out
 from markerscope.solver.pipeline.session import (

@@ -19,7 +19,7 @@ from markerscope.solver.core.errors import InputError
 from markerscope.solver.pipeline.methods import graph_of
 from markerscope.solver.pipeline.session import Session
 
-_BY_HAND = ("merges", "splits", "moves", "left_out")
+BY_HAND = ("merges", "splits", "moves", "left_out")
 
 
 def cut_at(session: Session, height: float) -> Edit:
@@ -99,7 +99,7 @@ def take_in(session: Session, markers: Collection[int], labels: Sequence[str]) -
 
 def undo_all(session: Session) -> Edit:
     """Leave the groups as the cut makes them."""
-    return Edit("Groups as the cut makes them", decide(session, "segment", {name: [] for name in _BY_HAND}))
+    return Edit("Groups as the cut makes them", decide(session, "segment", {name: [] for name in BY_HAND}))
 
 
 def _edit(session: Session, found: Segmentation, natural: SegmentSettings, wanted: np.ndarray, sentence: str) -> Edit:
@@ -109,7 +109,7 @@ def _edit(session: Session, found: Segmentation, natural: SegmentSettings, wante
         natural = replace(natural, merges=(), splits=_as_splits(base, wanted), moves=())
         if not _same(edited(base, natural, found.order), wanted):
             raise InputError("the groups shown are not the settings' any more", "this edit", "run Segmentation first")
-    table: dict[str, Any] = {name: _listed(getattr(natural, name)) for name in _BY_HAND}
+    table: dict[str, Any] = {name: _listed(getattr(natural, name)) for name in BY_HAND}
     return Edit(sentence, decide(session, "segment", table))
 
 

@@ -23,6 +23,7 @@ class Step:
     session : afterwards
     merge : what was dialled, if a value was
     answers : by stage, the key of the result that was last in force while the session was so
+    before : the same session in the words it had before it was saved; a run that was begun with them may still go on
     """
 
     sentence: str
@@ -30,6 +31,7 @@ class Step:
     session: Session
     merge: str = ""
     answers: Mapping[str, str] = field(default_factory=dict)
+    before: tuple[Session, ...] = ()
 
 
 class History:
@@ -82,7 +84,7 @@ class History:
 
     def note_for(self, session: Session, answers: Mapping[str, str]) -> bool:
         """Remember results for every step whose session is this one, wherever it is; False where nothing is new."""
-        same = [i for i, step in enumerate(self.steps) if step.session == session]
+        same = [i for i, step in enumerate(self.steps) if session == step.session or session in step.before]
         return sum(self._note(i, answers) for i in same) > 0  # every one is told
 
     def in_force_before(self, stage: str) -> Iterator[str]:
@@ -111,7 +113,9 @@ class History:
 
     def restate(self, session: Session) -> None:
         """Have the session that is there now say the same in other words."""
-        self.steps[self.position] = replace(self.steps[self.position], session=session)
+        step = self.steps[self.position]
+        if session != step.session:
+            self.steps[self.position] = replace(step, session=session, before=(*step.before, step.session))
 
     def go_to(self, position: int) -> bool:
         """Have the session as it was after a step; False where there is no such step or it is there already."""

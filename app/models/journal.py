@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import socket
 import threading
 from collections.abc import Mapping
@@ -22,12 +21,11 @@ from typing import Any
 from markerscope.app.models.history import History, Step
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.io.atomic import write_text_atomic
+from markerscope.solver.pipeline.in_force import answers_from
 from markerscope.solver.pipeline.session import session_document, session_from
 
 JOURNAL = "journal.json"
 VIEW = "view.json"
-IN_FORCE = "in_force.json"
-_KEY = re.compile(r"[0-9a-z]+")
 _PAUSE_S = 0.3
 """Between two writes, so that a camera that is turned does not keep the disk busy."""
 _KEPT = 60
@@ -60,7 +58,7 @@ def read_journal(folder: Path) -> Left | None:
                 str(row["sentence"]),
                 float(row["when"]),
                 session_from(row["session"], folder, file),
-                answers=_answers(row.get("answers")),
+                answers=answers_from(row.get("answers")),
             )
             for row in content["steps"]
         ]
@@ -93,20 +91,6 @@ def journal_of(history: History, state: str) -> dict[str, Any]:
             for step in steps
         ],
     }
-
-
-def read_answers(folder: Path) -> dict[str, str]:
-    """The results, key by stage, that were last in force when the session was saved; empty where that is not known."""
-    try:
-        return _answers(json.loads((folder / IN_FORCE).read_text(encoding="utf-8")))
-    except (OSError, ValueError):
-        return {}
-
-
-def _answers(content: Any) -> dict[str, str]:
-    """Keys by stage, as far as they can be understood."""
-    rows = content.items() if isinstance(content, dict) else ()
-    return {stage: key for stage, key in rows if isinstance(key, str) and _KEY.fullmatch(key)}
 
 
 def read_view(folder: Path) -> dict[str, Any]:

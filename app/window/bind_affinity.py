@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from PySide6.QtCore import Qt
 
-from markerscope.app.models import group_edits
+from markerscope.app.actions import Actions
+from markerscope.app.actions.group_actions import CUT_GROUPS
 from markerscope.app.models.workbench import Workbench
 from markerscope.app.views.affinity import affinity_picture, pair_distance, recut
 from markerscope.app.window.bind_scene import SceneBinder
@@ -20,11 +21,18 @@ class AffinityBinder:
     """Joins the matrix, the pair and the scene."""
 
     def __init__(
-        self, widget: AffinityView, pair: PairPlot, bench: Workbench, shown: Shown, scene: SceneBinder
+        self,
+        widget: AffinityView,
+        pair: PairPlot,
+        bench: Workbench,
+        shown: Shown,
+        scene: SceneBinder,
+        table: Actions,
     ) -> None:
         self.widget, self.pair, self.bench, self.shown, self.scene = widget, pair, bench, shown, scene
         self._pair: tuple[int, int] | None = None
-        self.edits = GroupEdits(bench, shown)
+        self.table, self.asked = table, GroupEdits(table)
+        widget.edit_why_not = self.asked.why_not
         bench.selection.changed.connect(lambda what: self._select())
         bench.clock.moved.connect(pair.set_time)
         shown.changed.connect(self._changed)
@@ -32,7 +40,7 @@ class AffinityBinder:
         widget.cut_committed.connect(self._commit)
         widget.pair_clicked.connect(lambda i, j: bench.selection.select_markers([i, j]))
         widget.leaves_clicked.connect(self._leaves)
-        widget.edit_requested.connect(self.edits.ask)
+        widget.edit_requested.connect(self.asked.ask)
         pair.seeked.connect(bench.clock.seek)
 
     def _changed(self, stages: frozenset[str]) -> None:
@@ -62,8 +70,9 @@ class AffinityBinder:
 
     def _commit(self, height: float) -> None:
         self._drag(height)
-        if not self.bench.apply(group_edits.cut_at(self.bench.document.session, height)):
+        if not self.table.do(CUT_GROUPS, height):
             self.scene.drag(None)
+            self._changed(frozenset({"segment"}))
 
     def _leaves(self, markers: list[int], held: Qt.KeyboardModifier) -> None:
         self.bench.selection.select_markers(markers, how(held))

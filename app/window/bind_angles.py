@@ -8,8 +8,7 @@ import numpy as np
 from PySide6.QtCore import QTimer
 
 from markerscope.app.actions import Actions
-from markerscope.app.actions.run_actions import run_stage
-from markerscope.app.models import edits
+from markerscope.app.actions.edit_actions import TELL_ANGLES
 from markerscope.app.models.results import Ref
 from markerscope.app.models.workbench import Workbench
 from markerscope.app.views.angles import angles_picture, bones_of, conventions, joint_of
@@ -22,6 +21,7 @@ class AnglesBinder:
 
     def __init__(self, widget: CurvesView, bench: Workbench, shown: Shown, table: Actions) -> None:
         self.widget, self.bench, self.shown = widget, bench, shown
+        self.table = table
         self._filling = QTimer(widget, singleShot=True, interval=0)  # after the scene, so that neither waits for both
         self._filling.timeout.connect(self._fill)
         shown.changed.connect(self._changed)
@@ -108,14 +108,13 @@ class AnglesBinder:
             self.widget.set_conventions(
                 [(name, own["title"]) for name, own in conventions().items()], settings.convention
             )
+            why_not = self.table.why_not_with(TELL_ANGLES, settings.convention)
+            self.widget.set_reasons(why_not, self.table.why_not("export.angles"))
 
     def _convention(self, name: str) -> None:
         """Tell the angles by another convention at once, where there is a fit to tell them of."""
-        bench = self.bench
-        if not bench.apply(edits.set_value(bench.document.session, "angles", "convention", name)):
+        if not self.table.do(TELL_ANGLES, name):
             self._conventions()
-        elif "fit" in bench.board.current and "angles" not in bench.board.current and not bench.runner.running:
-            bench.attempt(lambda: run_stage(bench, "angles"))
 
     def _select(self, what: frozenset[str]) -> None:
         if "bone" in what:

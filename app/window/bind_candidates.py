@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import QTimer
 
-from markerscope.app.models import edits
+from markerscope.app.actions import Actions
+from markerscope.app.actions.candidate_actions import PIN, pinned
 from markerscope.app.models.fits import CANDIDATE_COLOURS
-from markerscope.app.models.workbench import Said, Workbench
+from markerscope.app.models.workbench import Workbench
 from markerscope.app.views.candidates import CandidateTable as Table
 from markerscope.app.views.candidates import candidate_table, covered_by
 from markerscope.app.views.running import candidates_so_far
@@ -21,8 +22,9 @@ from markerscope.widgets.tables.candidates import CandidateTable
 class CandidatesBinder:
     """Fills the table, and takes the row that is chosen."""
 
-    def __init__(self, widget: CandidateTable, bench: Workbench, shown: Shown, ghosts: Ghosts) -> None:
+    def __init__(self, widget: CandidateTable, bench: Workbench, shown: Shown, ghosts: Ghosts, table: Actions) -> None:
         self.widget, self.bench, self.shown, self.ghosts = widget, bench, shown, ghosts
+        self.actions = table
         self._table: Table | None = None
         self._step = ""
         self._choosing = False
@@ -50,20 +52,25 @@ class CandidatesBinder:
         names = [step.name for step in table.steps]
         if self._step not in names:
             self._step = names[-1] if names else ""
-        pinned = self._pinned()
+        held = self._pinned()
         rows = table.rows
-        place = next((i for i, row in enumerate(rows) if row.candidate == pinned), -1) if pinned is not None else -1
+        place = next((i for i, row in enumerate(rows) if row.candidate == held), -1) if held is not None else -1
         inks = palette.categorical(CANDIDATE_COLOURS)
         of_ghost = [max(row.pool if row.candidate < 0 else row.candidate, 0) % CANDIDATE_COLOURS for row in rows]
         colours = inks[of_ghost] if rows else None
-        self.widget.set_rows(rows, place, table.score, table.unit, colours, table.meaning)
+        reasons = [self._why_not(row.candidate) for row in rows]
+        self.widget.set_rows(rows, place, table.score, table.unit, colours, table.meaning, reasons)
         self.widget.set_steps(table.steps, self._step)
         self._select()
 
     def _pinned(self) -> int | None:
-        if not self.bench.document.is_open:
-            return None
-        return getattr(self.bench.board.settings.get("fit"), "candidate", None)
+        return pinned(self.bench)
+
+    def _why_not(self, candidate: int) -> str:
+        """Why a candidate cannot be pinned, or let go of where it is pinned."""
+        if candidate >= 0 and candidate == self._pinned():
+            return self.actions.why_not("candidate.unpin")
+        return self.actions.why_not_with(PIN, candidate)
 
     def _so_far(self) -> Table | None:
         if not self.bench.runner.running:
@@ -78,8 +85,7 @@ class CandidatesBinder:
             return None
         in_use = None
         if ranked is not None:
-            pinned = self._pinned()
-            in_use = 0 if pinned is None else pinned
+            in_use = self._pinned() or 0
         covered = {} if ranked is None else self.shown.once("covered", (ranked, found), lambda: self._covered())
         return candidate_table(found, ranked, in_use, covered)
 
@@ -129,16 +135,10 @@ class CandidatesBinder:
         self.widget.set_selected(place)
 
     def _pin(self, row: int) -> None:
-        if self.shown.stale("orient"):
-            self.bench.say(
-                Said("note", "These candidates are out of date", "pinning", "run the stage Orientation first")
-            )
-            return
         if self._table is None or not 0 <= row < len(self._table.rows):
             return
         own = self._table.rows[row]
-        document = self.bench.document
-        if own.candidate == self._pinned():
-            self.bench.attempt(lambda: document.apply(edits.unpin_candidate(document.session)))
+        if own.candidate >= 0 and own.candidate == self._pinned():
+            self.actions.trigger("candidate.unpin")
         else:
-            self.bench.attempt(lambda: document.apply(edits.pin_candidate(document.session, own.candidate)))
+            self.actions.do(PIN, own.candidate)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from markerscope.app.actions import Actions
+from markerscope.app.actions.edit_actions import GO_TO_STEP
 from markerscope.app.models.workbench import Workbench
 from markerscope.widgets.panels.history import HistoryList
 
@@ -9,10 +11,10 @@ from markerscope.widgets.panels.history import HistoryList
 class HistoryBinder:
     """Shows the document's history."""
 
-    def __init__(self, widget: HistoryList, bench: Workbench) -> None:
+    def __init__(self, widget: HistoryList, bench: Workbench, table: Actions) -> None:
         self.widget, self.bench = widget, bench
         bench.document.changed.connect(lambda another: self.fill())
-        widget.jump_requested.connect(lambda count: bench.attempt(lambda: bench.document.go_to(count)))
+        widget.jump_requested.connect(lambda count: table.do(GO_TO_STEP, count))
 
     def fill(self) -> None:
         """Show it."""

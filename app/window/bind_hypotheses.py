@@ -6,8 +6,9 @@ import numpy as np
 from PySide6.QtCore import QTimer
 from PySide6.QtGui import QImage
 
-from markerscope.app.models import edits
-from markerscope.app.models.workbench import Said, Workbench
+from markerscope.app.actions import Actions
+from markerscope.app.actions.candidate_actions import PIN
+from markerscope.app.models.workbench import Workbench
 from markerscope.app.views.hypotheses import HypothesesPicture, hypotheses_picture
 from markerscope.app.views.posing import BONE_EDGES
 from markerscope.app.window.ghosts import Ghosts
@@ -21,9 +22,17 @@ from markerscope.widgets.scene.portraits import Portraits
 class HypothesesBinder:
     """Fills the cards. The pictures are drawn one by one, each in its turn of the event loop."""
 
-    def __init__(self, widget: HypothesesView, bench: Workbench, shown: Shown, ghosts: Ghosts, scene: Scene3D) -> None:
+    def __init__(
+        self,
+        widget: HypothesesView,
+        bench: Workbench,
+        shown: Shown,
+        ghosts: Ghosts,
+        scene: Scene3D,
+        table: Actions,
+    ) -> None:
         self.widget, self.bench, self.shown, self.ghosts = widget, bench, shown, ghosts
-        self._scene = scene
+        self._scene, self._table = scene, table
         self._portraits: Portraits | None = None
         self._blank = QImage(4, 3, QImage.Format.Format_RGB32)
         self._blank.fill(0x888888)
@@ -37,7 +46,7 @@ class HypothesesBinder:
         bench.document.changed.connect(lambda another: self.fill())
         bench.selection.changed.connect(lambda what: self._select())
         widget.hypothesis_selected.connect(lambda row: bench.selection.select(candidate=row, hypothesis=None))
-        widget.pin_requested.connect(self._pin)
+        widget.pin_requested.connect(lambda row: table.do(PIN, row))
 
     def fill(self) -> None:
         """Show the answers that there are."""
@@ -56,11 +65,19 @@ class HypothesesBinder:
         self._picture = hypotheses_picture(ranked, row, self.shown.get("solve"), verdict)
         if repr(self._picture) != repr(before):  # which takes NaN for NaN
             self._show()
+        else:
+            self._allow()
+
+    def _allow(self) -> None:
+        assert self._picture is not None
+        cards = self._picture.cards
+        self.widget.set_reasons({card.candidate: self._table.why_not_with(PIN, card.candidate) for card in cards})
 
     def _show(self) -> None:
         assert self._picture is not None
         cards = self._picture.cards
         self.widget.set_cards(cards, [self._images.get(c.candidate) for c in cards], self._picture.sentence)
+        self._allow()
         self._select()
 
     def _changed(self, stages: frozenset[str]) -> None:
@@ -70,15 +87,6 @@ class HypothesesBinder:
     def _select(self) -> None:
         row = self.bench.selection.candidate
         self.widget.set_selected(-1 if row is None else row)
-
-    def _pin(self, row: int) -> None:
-        if self.shown.stale("orient"):
-            self.bench.say(
-                Said("note", "These candidates are out of date", "pinning", "run the stage Orientation first")
-            )
-            return
-        document = self.bench.document
-        self.bench.attempt(lambda: document.apply(edits.pin_candidate(document.session, row)))
 
     def _draw_next(self) -> None:
         """One picture at a time, so that nothing waits for all of them; only while somebody looks."""

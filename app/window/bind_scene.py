@@ -15,6 +15,7 @@ from markerscope.app.views.colours import RGB, Legend
 from markerscope.app.views.posing import BONE_EDGES
 from markerscope.app.window.ghosts import Ghosts
 from markerscope.app.window.keys import how
+from markerscope.app.window.once import Once
 from markerscope.app.window.shown import Shown
 from markerscope.widgets import palette, theme
 from markerscope.widgets.scene import ColourBar, Scene3D
@@ -47,14 +48,15 @@ class SceneBinder:
         self._bones: tuple[BodyTrack, float, bool] | None = None
         self._legend: tuple[object, ...] | None = None
         self._ghost_layers: set[str] = set()
-        bench.clock.moved.connect(lambda time: self.draw())
-        bench.clock.changed.connect(self.draw)
+        self.drawing = Once(widget, self.draw)
+        bench.clock.moved.connect(self.drawing.ask)
+        bench.clock.changed.connect(self.drawing.ask)
         bench.display.changed.connect(self._display)
-        bench.selection.changed.connect(lambda what: self.draw())
+        bench.selection.changed.connect(self.drawing.ask)
         bench.opened.connect(self._opened)
         shown.changed.connect(self._changed)
-        shown.dated.connect(lambda stages: self.draw())
-        ghosts.changed.connect(self.draw)
+        shown.dated.connect(self.drawing.ask)
+        ghosts.changed.connect(self.drawing.ask)
         widget.marker_clicked.connect(lambda marker, held: bench.selection.select_markers([marker], how(held)))
         widget.markers_boxed.connect(lambda markers, held: bench.selection.select_markers(markers, _box_how(held)))
         widget.bone_clicked.connect(lambda layer, bone, held: self._bone(bone, held))
@@ -65,10 +67,11 @@ class SceneBinder:
     def drag(self, clusters: np.ndarray | None) -> None:
         """Show these groups while a cut is dragged; None shows those of the result."""
         self.clusters = clusters
-        self.draw()
+        self.drawing.ask()
 
     def draw(self) -> None:
-        """Show the clock's moment."""
+        """Show the clock's moment, at once."""
+        self.drawing.done()
         tracks = self.shown.tracks
         if tracks is None:
             self._clear()
@@ -220,7 +223,7 @@ class SceneBinder:
     def _changed(self, stages: frozenset[str]) -> None:
         if "segment" in stages:
             self.clusters = None
-        self.draw()
+        self.drawing.ask()
         tracks = self.shown.tracks
         if tracks is None:
             return
@@ -257,7 +260,7 @@ class SceneBinder:
         self.widget.show_layer("axes", display.layers["floor"])
         self.widget.set_follow(display.follow)
         self._names()
-        self.draw()
+        self.drawing.ask()
 
     def _names(self) -> None:
         markers = self.shown.markers

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from markerscope.app.actions import Actions
+from markerscope.app.actions.view_actions import BODY_OPACITY, TRAIL_LENGTH
 from markerscope.app.models.display import COLOURS, LAYERS
 from markerscope.app.models.workbench import Workbench
 from markerscope.app.window.actions import native
@@ -37,15 +38,15 @@ class SceneBarBinder:
     """Joins bar, display and scene."""
 
     def __init__(self, widget: SceneBar, scene: Scene3D, bench: Workbench, table: Actions) -> None:
-        self.widget, self.scene, self.bench = widget, scene, bench
+        self.widget, self.scene, self.bench, self.table = widget, scene, bench, table
         display = bench.display
         display.changed.connect(lambda names: self.fill())
-        widget.tool_toggled.connect(lambda on: display.set(boxing=on))
-        widget.colour_chosen.connect(lambda name: display.set(colour_by=name))
-        widget.layer_toggled.connect(display.show)
-        widget.opacity_changed.connect(lambda share: display.set(opacity=share))
-        widget.trail_changed.connect(self._trail)
-        widget.follow_toggled.connect(lambda on: display.set(follow=on))
+        widget.tool_toggled.connect(lambda on: self._switch("tool.select", on))
+        widget.colour_chosen.connect(lambda name: self._switch(f"colour.{name}", True))
+        widget.layer_toggled.connect(lambda name, on: self._switch(f"layer.{name}", on))
+        widget.opacity_changed.connect(lambda share: table.do(BODY_OPACITY, share))
+        widget.trail_changed.connect(lambda seconds: table.do(TRAIL_LENGTH, seconds))
+        widget.follow_toggled.connect(lambda on: self._switch("camera.follow", on))
         widget.view_chosen.connect(lambda name: table.trigger(name))
         self.fill()
 
@@ -58,7 +59,7 @@ class SceneBarBinder:
         )
         self.scene.set_tool("select" if display.boxing else "orbit")
 
-    def _trail(self, seconds: float) -> None:
-        """Whoever says how long trails are wants to see them."""
-        self.bench.display.set(trail_s=seconds)
-        self.bench.display.show("trails", seconds > 0)
+    def _switch(self, name: str, on: bool) -> None:
+        """Have an action that can be on or off as the control is."""
+        if self.table.is_on(name) != on and not self.table.trigger(name):
+            self.fill()

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from PySide6.QtCore import QTimer
 
-from markerscope.app.actions.run_actions import run_stage, run_until
-from markerscope.app.models import edits
+from markerscope.app.actions import Actions
+from markerscope.app.actions.edit_actions import COMPARE, GO_BACK, SET_VALUE, Compared, Value
+from markerscope.app.actions.run_actions import RUN_STAGE, RUN_TO
 from markerscope.app.models.fields import title
 from markerscope.app.models.jobs import Running
+from markerscope.app.models.results import Ref
 from markerscope.app.models.workbench import Workbench
 from markerscope.widgets.panels.progress_strip import ProgressStrip
 from markerscope.widgets.panels.stage_data import StageProgress
@@ -17,21 +21,21 @@ from markerscope.widgets.panels.stage_panel import StagePanel
 class StagesBinder:
     """Cards and the progress at the foot of the window."""
 
-    def __init__(self, panel: StagePanel, strip: ProgressStrip, bench: Workbench) -> None:
-        self.panel, self.strip, self.bench = panel, strip, bench
+    def __init__(self, panel: StagePanel, strip: ProgressStrip, bench: Workbench, table: Actions) -> None:
+        self.panel, self.strip, self.bench, self.table = panel, strip, bench, table
         self._stage = ""
         self._filling = QTimer(panel, singleShot=True, interval=0)  # many changes at once are shown once
         self._filling.timeout.connect(self._fill)
         bench.board.changed.connect(self.fill)
         bench.runner.changed.connect(self._ran)
         bench.runner.progressed.connect(self._progress)
-        panel.run.connect(lambda name: self._run(name))
-        panel.run_to.connect(lambda name: self._run_to(name))
-        panel.stop.connect(bench.runner.cancel)
-        strip.stop.connect(bench.runner.cancel)
+        panel.run.connect(lambda name: table.do(RUN_STAGE, name))
+        panel.run_to.connect(lambda name: table.do(RUN_TO, name))
+        panel.stop.connect(lambda: table.trigger("run.stop"))
+        strip.stop.connect(lambda: table.trigger("run.stop"))
         panel.setting_changed.connect(self._set)
-        panel.earlier_chosen.connect(self._earlier)
-        panel.compare_toggled.connect(bench.board.compare)
+        panel.earlier_chosen.connect(lambda stage, key: table.do(GO_BACK, Ref(stage, key)))
+        panel.compare_toggled.connect(self._compare)
         panel.opened.connect(lambda name, is_open: bench.selection.select(stage=name) if is_open else None)
 
     def fill(self) -> None:
@@ -39,15 +43,10 @@ class StagesBinder:
         self._filling.start()
 
     def _fill(self) -> None:
-        self.panel.set_stages(self.bench.board.cards)  # type: ignore[arg-type]  # cards have what the panel reads
-
-    def _run(self, stage: str) -> None:
-        self.bench.selection.select(stage=stage)
-        self.bench.attempt(lambda: run_stage(self.bench, stage))
-
-    def _run_to(self, stage: str) -> None:
-        self.bench.selection.select(stage=stage)
-        self.bench.attempt(lambda: run_until(self.bench, stage))
+        cards = [
+            replace(card, why_not=self.table.why_not_with(RUN_STAGE, card.name)) for card in self.bench.board.cards
+        ]
+        self.panel.set_stages(cards)  # type: ignore[arg-type]  # cards have what the panel reads
 
     def _ran(self) -> None:
         if not self.bench.runner.running:
@@ -64,10 +63,9 @@ class StagesBinder:
             self.panel.set_progress(at.stage, StageProgress(at.part, at.text, at.stage_left))
 
     def _set(self, stage: str, name: str, value: object) -> None:
-        session = self.bench.document.session
-        done = self.bench.attempt(lambda: self.bench.document.apply(edits.set_value(session, stage, name, value)))
-        if not done:
+        if not self.table.do(SET_VALUE, Value(stage, name, value)):
             self.fill()
 
-    def _earlier(self, stage: str, key: str) -> None:
-        self.bench.attempt(lambda: self.bench.document.apply(self.bench.board.go_back(stage, key)))
+    def _compare(self, stage: str, key: str, on: bool) -> None:
+        if not self.table.do(COMPARE, Compared(Ref(stage, key), on)):
+            self.fill()

@@ -7,8 +7,11 @@ from typing import cast
 import numpy as np
 from PySide6.QtCore import QTimer
 
-from markerscope.app.models import edits
+from markerscope.app.actions import Actions
+from markerscope.app.actions.edit_actions import SET_OFFSET
+from markerscope.app.actions.play_actions import SET_RANGE
 from markerscope.app.models.fits import CachedFits, colour_places
+from markerscope.app.models.offsets import found_sync
 from markerscope.app.models.workbench import Workbench
 from markerscope.app.views import timelines as views
 from markerscope.app.views.colours import by_cluster
@@ -17,7 +20,6 @@ from markerscope.app.window.keys import how
 from markerscope.app.window.residual_menu import ResidualMenu
 from markerscope.app.window.shown import Shown
 from markerscope.solver.fit.counting import candidate_number
-from markerscope.solver.sync.offset import Sync
 from markerscope.widgets import palette
 from markerscope.widgets.plots.rows import Curve, CurveRow, Row
 from markerscope.widgets.plots.timelines import Timelines
@@ -29,12 +31,13 @@ _LONGEST = 34
 class TimelinesBinder:
     """Fills the rows, and takes what is dragged."""
 
-    def __init__(self, widget: Timelines, bench: Workbench, shown: Shown, ghosts: Ghosts) -> None:
+    def __init__(self, widget: Timelines, bench: Workbench, shown: Shown, ghosts: Ghosts, table: Actions) -> None:
         self.widget, self.bench, self.shown, self.ghosts = widget, bench, shown, ghosts
         self.fits = CachedFits(bench.board)
-        self.menu = ResidualMenu(bench, self.fits)
+        self.menu = ResidualMenu(bench, self.fits, table)
         tip = "Which fits are compared, over which markers, and by which value, in mm"
         widget.set_row_menu(RESIDUAL, "Compare", tip, self.menu.menu)
+        self.table = table
         self._asked: dict[str, object] = {}
         self._span: tuple[float, float] | None = None
         self._filling = QTimer(widget, singleShot=True, interval=0)  # after the scene, so that neither waits for both
@@ -48,7 +51,7 @@ class TimelinesBinder:
         shown.changed.connect(self._changed)
         shown.dated.connect(lambda stages: self._filling.start())
         widget.seeked.connect(bench.clock.seek)
-        widget.range_changed.connect(bench.clock.set_loop)
+        widget.range_changed.connect(self._range)
         widget.offset_dragged.connect(lambda offset: bench.clock.set_sync(offset, bench.clock.timing.rate_ratio))
         widget.offset_committed.connect(self._offset)
         widget.row_clicked.connect(self._clicked)
@@ -69,12 +72,11 @@ class TimelinesBinder:
         self.widget.set_offset(self.bench.clock.timing.offset)
 
     def _offset(self, offset: float) -> None:
-        session, sync = self.bench.document.session, self.shown.get("sync")
-        found = sync if sync is not None and sync.method != "given" else self._found_offset()
-        if found is not None and found.offset == offset:  # the automatic one is no number that was given
-            self.bench.apply(edits.find_offset(session))
-        else:
-            self.bench.apply(edits.set_offset(session, offset))
+        self.table.do(SET_OFFSET, offset)
+
+    def _range(self, ends: tuple[float, float] | None) -> None:
+        if not self.table.do(SET_RANGE, ends):
+            self.widget.set_range(self.bench.clock.loop)
 
     def _changed(self, stages: frozenset[str]) -> None:
         if stages & {"markers", "clean", "landmarks", "prior", "sync", "segment", "fit", "compared"}:
@@ -127,7 +129,7 @@ class TimelinesBinder:
             found.append(residual)
         if sync is not None and watched is not None:
             own = (sync, tracks.markers, watched)
-            found.append(shown.once("offset", own, lambda: views.offset_row(*own, self._found_offset())))
+            found.append(shown.once("offset", own, lambda: views.offset_row(*own, found_sync(self.bench.board))))
         return found
 
     def _residual(self) -> CurveRow | None:
@@ -200,16 +202,6 @@ class TimelinesBinder:
             lambda: views.candidate_curve(track, markers, label, palette.categorical(12)[row % 12], statistic, chosen),
         )
         return cast(Curve, made)
-
-    def _found_offset(self) -> Sync | None:
-        """The result that looked for the offset by itself and was in force last, None where there is none."""
-        board, results = self.bench.board, self.bench.board.results
-        for key in dict.fromkeys((board.keys.get("sync", ""), *self.bench.document.history.in_force_before("sync"))):
-            if results.has("sync", key):
-                value: Sync = results.get("sync", key)
-                if value.method != "given":
-                    return value
-        return None
 
     def _clicked(self, row: str, time: float, index: int) -> None:
         tracks = self.shown.tracks

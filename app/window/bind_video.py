@@ -13,6 +13,7 @@ from markerscope.app.views import scene, video
 from markerscope.app.views.posing import BONE_EDGES
 from markerscope.app.window.bind_scene import TROUBLE_REMEDY
 from markerscope.app.window.keys import how
+from markerscope.app.window.once import Once
 from markerscope.app.window.shown import Shown
 from markerscope.solver.sync.offset import Sync
 from markerscope.widgets.video import VideoView
@@ -28,19 +29,18 @@ class VideoBinder:
 
     def __init__(self, widget: VideoView, bench: Workbench, shown: Shown) -> None:
         self.widget, self.bench, self.shown = widget, bench, shown
-        bench.clock.moved.connect(lambda time: self.draw())
-        bench.clock.changed.connect(self.draw)
-        bench.video_changed.connect(self.draw)
-        bench.display.changed.connect(lambda names: self.draw())
-        bench.selection.changed.connect(lambda what: self.draw())
+        self.drawing = Once(widget, self.draw)
+        for signal in (bench.clock.moved, bench.clock.changed, bench.video_changed):
+            signal.connect(self.drawing.ask)
+        for told in (bench.display.changed, bench.selection.changed, shown.changed, shown.dated):
+            told.connect(self.drawing.ask)
         bench.opened.connect(self._opened)
-        shown.changed.connect(lambda stages: self.draw())
-        shown.dated.connect(lambda stages: self.draw())
         widget.marker_clicked.connect(lambda marker, held: bench.selection.select_markers([marker], how(held)))
         widget.trouble.connect(lambda text: bench.say(Said("error", text, remedy=TROUBLE_REMEDY)))
 
     def draw(self) -> None:
-        """Show the clock's moment."""
+        """Show the clock's moment, at once."""
+        self.drawing.done()
         frames, clock = self.bench.frames, self.bench.clock
         if frames is None:
             self.widget.set_frame(None, "No video" if self.bench.document.is_open else "")

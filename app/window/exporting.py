@@ -69,6 +69,7 @@ def report_pictures(window: MainWindow) -> list[Any]:
     """Views of the session as it is shown now."""
     from markerscope.solver.report.report_data import Picture
 
+    window.draw_now()
     found = [Picture("The fitted body and the markers", png_of(window.scene.image(1.0, (900, 700))))]
     if window.bench.frames is not None:
         found.append(Picture("Markers and body projected into the video", png_of(window.video.image())))

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
+from typing import cast
 
-import numpy as np
 from PySide6.QtCore import QEvent, QObject, QPoint, Qt
 from PySide6.QtGui import QContextMenuEvent, QMouseEvent
 from PySide6.QtWidgets import QMenu
 
 from markerscope.app.actions import Actions
-from markerscope.app.models import group_edits
-from markerscope.app.models.edits import Edit
+from markerscope.app.actions.group_actions import EDIT_GROUPS, GroupEdit, Kind
 from markerscope.app.models.workbench import Workbench
 from markerscope.app.views.colours import by_cluster
 from markerscope.app.window.actions import native
 from markerscope.app.window.shown import Shown
+from markerscope.widgets.allow import allow
 from markerscope.widgets.plots.affinity_menu import edit_menu
 from markerscope.widgets.scene import Scene3D
 
@@ -30,25 +29,16 @@ _OFFERED = (
 class GroupEdits:
     """Carries out what such a menu asks for."""
 
-    def __init__(self, bench: Workbench, shown: Shown) -> None:
-        self.bench, self.shown = bench, shown
+    def __init__(self, table: Actions) -> None:
+        self.table = table
 
     def ask(self, kind: str, markers: list[int], target: int) -> None:
         """Do one of "merge", "split", "leave_out", "take_in", or "move" to the group ``target``."""
-        self.bench.attempt(lambda: self.bench.document.apply(self._made(kind, markers, target)))
+        self.table.do(EDIT_GROUPS, GroupEdit(cast(Kind, kind), tuple(markers), target))
 
-    def _made(self, kind: str, markers: list[int], target: int) -> Edit:
-        found, session = self.shown.segmentation, self.bench.document.session
-        labels = self.shown.markers.labels  # type: ignore[union-attr]
-        if kind == "move":
-            host = int(np.flatnonzero(found.clusters == target)[0])
-            return group_edits.move(session, found, markers, host, labels)
-        if kind == "take_in":
-            return group_edits.take_in(session, markers, labels)
-        edits: dict[str, Callable[..., Edit]] = {
-            "merge": group_edits.merge, "split": group_edits.split, "leave_out": group_edits.leave_out,
-        }  # fmt: skip
-        return edits[kind](session, found, markers, labels)
+    def why_not(self, kind: str, markers: list[int], target: int) -> str:
+        """Why that cannot be done, "" if it can."""
+        return self.table.why_not_with(EDIT_GROUPS, GroupEdit(cast(Kind, kind), tuple(markers), target))
 
 
 class SceneMenu(QObject):
@@ -57,7 +47,7 @@ class SceneMenu(QObject):
     def __init__(self, scene: Scene3D, bench: Workbench, shown: Shown, table: Actions) -> None:
         super().__init__(scene)
         self.scene, self.bench, self.shown, self.table = scene, bench, shown, table
-        self.edits = GroupEdits(bench, shown)
+        self.asked = GroupEdits(table)
         self._pressed: QPoint | None = None
         scene.installEventFilter(self)
 
@@ -83,7 +73,7 @@ class SceneMenu(QObject):
         clusters, tracks = self.shown.clusters, self.shown.markers
         if markers and clusters is not None and tracks is not None:
             inks = by_cluster(clusters).colours
-            menu = edit_menu(self.scene, markers, clusters, tracks.labels, inks, self.edits.ask)
+            menu = edit_menu(self.scene, markers, clusters, tracks.labels, inks, self.asked.ask, self.asked.why_not)
             menu.addSeparator()
         else:
             menu = QMenu(self.scene)
@@ -92,8 +82,7 @@ class SceneMenu(QObject):
             action = self.table.table[name]
             made = menu.addAction(f"{action.title}\t{native(action)}", partial(self.table.trigger, name))
             reason, on = self.table.why_not(name), self.table.is_on(name)
-            made.setEnabled(not reason)
-            made.setToolTip(f"{action.help} Not now: {reason}." if reason else action.help)
+            allow(made, reason, action.help)
             if on is not None:
                 made.setCheckable(True)
                 made.setChecked(on)

@@ -10,8 +10,8 @@ from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 
 from markerscope.app.actions import ACTIONS, Actions, Asks
-from markerscope.app.actions.session_actions import may_close, open_path
-from markerscope.app.models import edits
+from markerscope.app.actions.edit_actions import GIVE_INPUT, GivenFile
+from markerscope.app.actions.session_actions import OPEN, may_close
 from markerscope.app.models.workbench import Said, Workbench
 from markerscope.app.window.actions import Menus
 from markerscope.app.window.asks import WindowAsks
@@ -148,22 +148,23 @@ class MainWindow(QMainWindow):
     def _bind(self) -> None:
         bench, shown, ghosts = self.bench, self.shown, self.ghosts
         self.scene_binder = scene = SceneBinder(self.scene, bench, shown, ghosts)
+        self.video_binder = VideoBinder(self.video, bench, shown)
         self.scene_menu = SceneMenu(self.scene, bench, shown, self.table)
         self.binders = [
             scene,
             SceneBarBinder(self.scene_bar, self.scene, bench, self.table),
-            VideoBinder(self.video, bench, shown),
-            TimelinesBinder(self.timelines, bench, shown, ghosts),
-            StagesBinder(self.stages, self.progress, bench),
-            TransportBinder(self.transport, bench),
+            self.video_binder,
+            TimelinesBinder(self.timelines, bench, shown, ghosts, self.table),
+            StagesBinder(self.stages, self.progress, bench, self.table),
+            TransportBinder(self.transport, bench, self.table),
             MessagesBinder(self.messages, bench),
-            AffinityBinder(self.affinity, self.pair, bench, shown, scene),
-            CandidatesBinder(self.candidates, bench, shown, ghosts),
-            HypothesesBinder(self.hypotheses, bench, shown, ghosts, self.scene),
+            AffinityBinder(self.affinity, self.pair, bench, shown, scene, self.table),
+            CandidatesBinder(self.candidates, bench, shown, ghosts, self.table),
+            HypothesesBinder(self.hypotheses, bench, shown, ghosts, self.scene, self.table),
             ConvergenceBinder(self.convergence, bench, shown, ghosts),
             MarkersBinder(self.markers, bench, shown),
             AnglesBinder(self.angles, bench, shown, self.table),
-            HistoryBinder(self.history, bench),
+            HistoryBinder(self.history, bench, self.table),
             DatedBinder(self.dated, shown),
             WelcomeBinder(self.welcome, bench, self.table, self.open_path, self.drop),
         ]
@@ -178,7 +179,7 @@ class MainWindow(QMainWindow):
 
     def open_path(self, path: Path) -> None:
         """Open a session, or begin one from a marker file; what cannot be opened is said."""
-        self.bench.attempt(lambda: open_path(self.bench, self.asks, path))
+        self.table.do(OPEN, path)
 
     def raise_dock(self, name: str) -> None:
         """Bring a panel to the front."""
@@ -187,6 +188,11 @@ class MainWindow(QMainWindow):
     def layout_anew(self) -> None:
         """Put every panel back in its first place."""
         self.docks.arrange()
+
+    def draw_now(self) -> None:
+        """Have scene and video show all that has changed: a picture of them is about to be taken."""
+        self.scene_binder.drawing.now()
+        self.video_binder.drawing.now()
 
     def redraw(self) -> None:
         """Draw everything again, in other colours."""
@@ -284,8 +290,7 @@ class MainWindow(QMainWindow):
             self.open_path(others[0])
             self.dropped_video = None
         elif videos and self.bench.document.is_open:
-            edit = edits.set_input(self.bench.document.session, "video_file", videos[0])
-            self.bench.attempt(lambda: self.bench.document.apply(edit))
+            self.table.do(GIVE_INPUT, GivenFile("video_file", videos[0]))
         elif videos:
             self.bench.say(Said("note", "A session begins with markers", videos[0].name, "open a marker file first"))
 

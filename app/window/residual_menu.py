@@ -7,6 +7,8 @@ from functools import partial
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu
 
+from markerscope.app.actions import Actions
+from markerscope.app.actions.view_actions import RESIDUAL_SELECTED, RESIDUAL_VALUE, SHOW_FIT, ShownFit
 from markerscope.app.models.display import STATISTICS
 from markerscope.app.models.fits import CachedFits
 from markerscope.app.models.workbench import Workbench
@@ -17,8 +19,8 @@ _LONGEST = 60
 class ResidualMenu:
     """A menu that is made anew whenever it is opened."""
 
-    def __init__(self, bench: Workbench, fits: CachedFits) -> None:
-        self.bench, self.fits = bench, fits
+    def __init__(self, bench: Workbench, fits: CachedFits, table: Actions) -> None:
+        self.bench, self.fits, self.table = bench, fits, table
         self.menu = QMenu()
         self.menu.setToolTipsVisible(True)
         self.menu.aboutToShow.connect(self.fill)
@@ -40,10 +42,10 @@ class ResidualMenu:
         for statistic, title in STATISTICS.items():
             action = self._checked(title, display.residual == statistic)
             group.addAction(action)
-            action.triggered.connect(lambda on=True, statistic=statistic: display.set(residual=statistic))
+            action.triggered.connect(lambda on=True, statistic=statistic: self.table.do(RESIDUAL_VALUE, statistic))
         menu.addSeparator()
         only = self._checked("Selected markers only", display.residual_selected)
-        only.toggled.connect(lambda on: display.set(residual_selected=on))
+        only.toggled.connect(lambda on: self.table.do(RESIDUAL_SELECTED, on))
 
     def _checked(self, text: str, on: bool) -> QAction:
         action = self.menu.addAction(text)
@@ -52,5 +54,4 @@ class ResidualMenu:
         return action
 
     def _show(self, key: str, on: bool) -> None:
-        hidden = set(self.bench.display.hidden_fits) - {key} | (set() if on else {key})
-        self.bench.display.set(hidden_fits=tuple(sorted(hidden)))
+        self.table.do(SHOW_FIT, ShownFit(key, on))

@@ -76,6 +76,7 @@ class Showing:
 
     def write(self, name: str, path: Path) -> None:
         """Write a picture or a film of the scene."""
+        self.window.draw_now()
         if name == "picture":
             try:
                 self.window.scene.save_png(path, 2.0)

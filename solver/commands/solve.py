@@ -21,6 +21,7 @@ from markerscope.solver.fit.results import Candidate
 from markerscope.solver.io.camera import camera_file
 from markerscope.solver.io.output_folder import remove_if_empty
 from markerscope.solver.pipeline.doubts import assumptions, doubts
+from markerscope.solver.pipeline.in_force import write_answers
 from markerscope.solver.pipeline.look import look_at
 from markerscope.solver.pipeline.methods import GRAPHS, graph_of, spelt_out, with_method
 from markerscope.solver.pipeline.names import CHECK, FIT, MARKERS, ORIENT, SURFACE, SYNC
@@ -82,6 +83,7 @@ def solve_session(request: SolveRequest, progress: Progress = silent, on_event: 
         require_state(folder, state, "nothing that was computed is lost; solve again with what it says now")
         not_kept = write_outputs(session, graph)
         _save(session)
+        write_answers(session.folder, graph.keys)
     progress(1.0, "done")
     return _outcome(session, graph, not_kept)
 

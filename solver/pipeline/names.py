@@ -9,7 +9,7 @@ from markerscope.solver.core.landmarks import Landmarks
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.prior import PosePrior
 from markerscope.solver.fit.doubts.rules import Verdict
-from markerscope.solver.fit.neutral import Neutral
+from markerscope.solver.fit.known.neutral import Neutral
 from markerscope.solver.fit.published.results import PaperLocalization, PaperSolve
 from markerscope.solver.fit.results import FittedMotion, Localization, Orientation
 from markerscope.solver.fit.surface import SurfaceDistance

@@ -128,8 +128,11 @@ def test_the_menu_asks_for_edits(shown: AffinityView) -> None:
     actions["Merge their groups"].trigger()
     actions["Leave out"].trigger()
     assert asked == [("merge", [0, 1], -1), ("leave_out", [0, 1], -1)]
+    shown.edit_why_not = lambda kind, markers, target: "there is but one" if (kind, markers) == ("merge", [0]) else ""
     alone = shown.menu_for([0])
-    assert not next(a for a in alone.actions() if a.text() == "Merge their groups").isEnabled()
+    merge = next(a for a in alone.actions() if a.text() == "Merge their groups")
+    assert not merge.isEnabled() and "Not now: there is but one." in merge.toolTip()
+    assert next(a for a in alone.actions() if a.text() == "Leave out").isEnabled()
     moves = next(a for a in alone.actions() if a.text() == "Move to group").menu()
     assert [a.text() for a in moves.actions()] == ["2: b, d"]
     moves.actions()[0].trigger()

@@ -75,7 +75,7 @@ def test_buttons_ask_for_runs(panel: StagePanel) -> None:
     panel.card("orient").set_open(True)
     press(panel.card("orient").run_button)  # says why it cannot
     assert asked == [("run", "segment"), ("to", "segment"), ("stop", "")]
-    assert "in progress" in panel.card("orient").run_button.toolTip()
+    assert "Not now: stages are running" in panel.card("orient").run_button.toolTip()
 
 
 def test_earlier_results_are_gone_back_to_and_compared(panel: StagePanel) -> None:

@@ -35,7 +35,7 @@ STAGES = (
         ),
         help="Groups markers that move rigidly together",
     ),
-    StageData("orient", "Orientation", "running", None, "", why_not="A run is in progress: stop it first."),
+    StageData("orient", "Orientation", "running", None, "", why_not="stages are running; wait for them, or stop them"),
     StageData(
         "fit", "Fit", "failed", 3.2,
         "The fit stopped at marker LANK, frame 112: no group covers the left shank. Merge groups, run again.",

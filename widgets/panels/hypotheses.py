@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from markerscope.widgets.allow import allow
 from markerscope.widgets.icons import icon
 from markerscope.widgets.panels.energy_bars import EnergyBar, TermKey
 from markerscope.widgets.plots.ink import colour, em, pen
@@ -100,8 +101,7 @@ class HypothesisCard(QFrame):
         badge = QLabel(", ".join(badges))
         badge.setForegroundRole(QPalette.ColorRole.Link)
         self.pin = QPushButton(icon("pin"), "In use" if card.in_use else "Pin")
-        self.pin.setToolTip("Hold this answer, and go on from it; can be undone")
-        self.pin.setEnabled(not card.in_use)
+        self.set_reason("")
         self.pin.clicked.connect(lambda: self.pin_requested.emit(card.candidate))
         column = QVBoxLayout()
         column.setSpacing(4)
@@ -116,6 +116,11 @@ class HypothesisCard(QFrame):
         self.set_low(False)
         heading, margin = f"camera heading {degrees(card.heading_deg)} degrees", f"{card.margin:.2f} times best"
         self.setAccessibleName(", ".join([card.title, heading, margin, *badges]))
+
+    def set_reason(self, reason: str) -> None:
+        """Say why it cannot be pinned now, "" where it can."""
+        own = "the fit goes on from it" if self.card.in_use else reason
+        allow(self.pin, own, "Hold this answer, and go on from it; can be undone")
 
     def set_low(self, low: bool) -> None:
         """Put the picture beside the figures instead of above them, where there is little height."""
@@ -238,6 +243,11 @@ class HypothesesView(QWidget):
     def cards(self) -> list[HypothesisCard]:
         """The cards, left to right."""
         return list(self._cards)
+
+    def set_reasons(self, reasons: Mapping[int, str]) -> None:
+        """Say of candidates why they cannot be pinned now, "" where they can."""
+        for made in self._cards:
+            made.set_reason(reasons.get(made.card.candidate, ""))
 
     def set_selected(self, candidate: int) -> None:
         """Frame the card of a candidate; nothing is emitted."""

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from markerscope.widgets.allow import allow
 from markerscope.widgets.icons import icon
 from markerscope.widgets.panels.bar import show_part
 from markerscope.widgets.panels.fields import SettingsForm
@@ -152,8 +153,7 @@ class StageCard(QFrame):
         alone = f"Compute this stage {there}. What it is computed from is computed only where it is missing."
         down = "Compute what is missing of the stages from the first down to this one. What is there stays as it is."
         for button, what in ((self.run_button, alone), (self.run_to_button, down)):
-            button.setEnabled(not data.why_not)
-            button.setToolTip(data.why_not or what)
+            allow(button, data.why_not, what)
         if self.is_open():
             self._fill_details()
         self._paint()

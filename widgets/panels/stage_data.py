@@ -77,7 +77,7 @@ class StageData:
     fields : its settings
     earlier : its results in the store, newest first
     help : what the stage does
-    why_not : why it cannot run now, empty if it can
+    why_not : why it cannot run now, a clause; empty if it can
     """
 
     name: str

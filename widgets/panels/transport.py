@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from PySide6.QtCore import QSignalBlocker, QSize, Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
+from markerscope.widgets.allow import allow
 from markerscope.widgets.icons import icon
 from markerscope.widgets.plots.scales import clock
 
@@ -59,12 +61,16 @@ class Transport(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAccessibleName("Playback")
+        self._reasons: Mapping[str, str] = {}
+        self._tips: dict[str, str] = {}
         self.to_start = self._button("to_start", "To the start (Home)")
         self.back = self._button("step_back", "One frame back (Left; with Shift ten)")
         self.play = self._button("play", "Play (Space)")
         self.forward = self._button("step_forward", "One frame on (Right; with Shift ten)")
         self.to_end = self._button("to_end", "To the end (End)")
         self.loop = self._button("loop", "Loop over the range, or over all")
+        for name in ("to_start", "back", "play", "forward", "to_end"):
+            self._tips[name] = getattr(self, name).toolTip()
         self.loop.setCheckable(True)
         self.speed = QComboBox()
         self.speed.setAccessibleName("Speed of playing, times real time")
@@ -109,7 +115,8 @@ class Transport(QWidget):
         if playing != self._playing:
             self._playing = playing
             self.play.setIcon(icon("pause" if playing else "play"))
-            self.play.setToolTip("Stop (Space)" if playing else "Play (Space)")
+            self._tips["play"] = "Stop (Space)" if playing else "Play (Space)"
+            allow(self.play, self._reasons.get("play", ""), self._tips["play"])
             self.play.setAccessibleName("Stop" if playing else "Play")
         with QSignalBlocker(self.speed):
             at = next((k for k in range(self.speed.count()) if abs(self.speed.itemData(k) - speed) < 1e-9), -1)
@@ -119,6 +126,14 @@ class Transport(QWidget):
             self.speed.setCurrentIndex(at)
         with QSignalBlocker(self.loop):
             self.loop.setChecked(loop)
+
+    def set_reasons(self, reasons: Mapping[str, str]) -> None:
+        """Say of the buttons "to_start", "back", "play", "forward", "to_end" why they do nothing now, "" if they do."""
+        for name, reason in reasons.items():
+            if self._reasons.get(name, "") != reason:
+                button: QToolButton = getattr(self, name)
+                allow(button, reason, self._tips[name])
+        self._reasons = dict(reasons)
 
     def set_readouts(self, markers: Readout, video: Readout) -> None:
         """Say where both streams are; the labels keep their width while digits change."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
@@ -43,6 +43,10 @@ class AffinityView(QWidget):
     leaves_clicked(markers, modifiers) : a label, a group's strip, or all below a branch
     edit_requested(kind, markers, target) : "merge", "split", "leave_out", "take_in", or "move" to the group ``target``
         (else -1)
+
+    Attributes
+    ----------
+    edit_why_not : called with what ``edit_requested`` would say: why that cannot be done now, "" if it can
     """
 
     cut_dragged = Signal(float)
@@ -53,6 +57,7 @@ class AffinityView(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self.edit_why_not: Callable[[str, list[int], int], str] = lambda kind, markers, target: ""
         self.setAccessibleName("Affinity of the markers")
         self.setAccessibleDescription("Standard deviation of the distance of every two markers, and the tree of groups")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -264,7 +269,8 @@ class AffinityView(QWidget):
 
     def menu_for(self, markers: list[int]) -> QMenu:
         """What can be done with these markers."""
-        return edit_menu(self, markers, self._clusters, self._labels, self._colours, self.edit_requested.emit)
+        ask, why_not = self.edit_requested.emit, self.edit_why_not
+        return edit_menu(self, markers, self._clusters, self._labels, self._colours, ask, why_not)
 
     def event(self, event: QEvent) -> bool:
         """Say what lies below the pointer."""

@@ -8,6 +8,7 @@ import numpy as np
 from PySide6.QtGui import QIcon, QPixmap
 from PySide6.QtWidgets import QMenu, QWidget
 
+from markerscope.widgets.allow import allow
 from markerscope.widgets.icons import icon
 from markerscope.widgets.plots.ink import colour
 
@@ -19,6 +20,7 @@ def edit_menu(
     labels: Sequence[str],
     colours: np.ndarray,
     ask: Callable[[str, list[int], int], None],
+    why_not: Callable[[str, list[int], int], str] = lambda kind, markers, target: "",
 ) -> QMenu:
     """A menu of edits.
 
@@ -28,24 +30,29 @@ def edit_menu(
     clusters : (M,) group of each marker, -1 for none
     labels, colours : of all markers; (M, 3) uint8
     ask : called with kind, markers and target group (-1 where there is none)
+    why_not : called with the same, why it cannot be done; "" if it can
     """
     menu = QMenu(parent)
     groups = sorted({int(g) for g in clusters[markers] if g >= 0})
     menu.addSection(", ".join(labels[m] for m in markers[:4]) + (" …" if len(markers) > 4 else ""))
 
-    def add(kind: str, text: str, enabled: bool) -> None:
-        action = menu.addAction(icon(kind), text, lambda: ask(kind, markers, -1))
-        action.setEnabled(enabled)
+    menu.setToolTipsVisible(True)
 
-    add("merge", "Merge their groups", len(groups) > 1)
-    add("split", "Split off as a group of their own", bool(groups))
+    def add(kind: str, text: str) -> None:
+        action = menu.addAction(icon(kind), text, lambda: ask(kind, markers, -1))
+        allow(action, why_not(kind, markers, -1), text)
+
+    add("merge", "Merge their groups")
+    add("split", "Split off as a group of their own")
     moves = menu.addMenu(icon("move"), "Move to group")
     for group in sorted({int(g) for g in clusters if g >= 0} - (set(groups) if len(groups) == 1 else set())):
         members = np.flatnonzero(clusters == group)
         text = f"{group + 1}: {', '.join(labels[m] for m in members[:3])}{' …' if len(members) > 3 else ''}"
         swatch = QPixmap(16, 16)
         swatch.fill(colour(colours[members[0]]))
-        moves.addAction(QIcon(swatch), text, lambda g=group: ask("move", markers, g))
-    add("leave_out", "Leave out", bool(groups))
-    add("take_in", "Put back in", bool((clusters[markers] < 0).any()))
+        action = moves.addAction(QIcon(swatch), text, lambda g=group: ask("move", markers, g))
+        allow(action, why_not("move", markers, group), text)
+    moves.setToolTipsVisible(True)
+    add("leave_out", "Leave out")
+    add("take_in", "Put back in")
     return menu

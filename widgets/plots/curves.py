@@ -25,6 +25,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from markerscope.widgets.allow import allow
 from markerscope.widgets.boxes import ChoiceBox
 from markerscope.widgets.icons import icon
 from markerscope.widgets.plots.angle_plots import AnglePlots
@@ -87,7 +88,6 @@ class CurvesView(QWidget):
         self.tree.itemActivated.connect(self._clicked)
         self.convention = ChoiceBox()
         self.convention.setAccessibleName("Convention of the angles")
-        self.convention.setToolTip("By which convention the angles are told: their names, sequences and signs")
         self.convention.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.convention.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.convention.setMinimumContentsLength(26)
@@ -97,7 +97,7 @@ class CurvesView(QWidget):
         self.export.setAutoRaise(True)
         self.export.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.export.setAccessibleName("Export angles")
-        self.export.setToolTip("Write the angles as CSV, in degrees")
+        self.set_reasons("", "")
         self.export.clicked.connect(lambda: self.export_wanted.emit())
         self.set_conventions((), "")
         self.plots = AnglePlots()
@@ -165,6 +165,11 @@ class CurvesView(QWidget):
         if not again:
             self._fill()
         self._show()
+
+    def set_reasons(self, convention: str, export: str) -> None:
+        """Say why another convention cannot be chosen and why nothing can be exported now, "" where it can."""
+        allow(self.convention, convention, "By which convention the angles are told: their names, sequences and signs")
+        allow(self.export, export, "Write the angles as CSV, in degrees")
 
     def set_conventions(self, choices: Sequence[tuple[str, str]], current: str) -> None:
         """Offer conventions, each a name and a title, one of them in force; nothing is emitted."""

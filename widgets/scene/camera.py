@@ -108,7 +108,10 @@ class Camera:
         return replace(self, azimuth=float(azimuth), elevation=float(elevation))
 
     def fitted(self, points: np.ndarray, aspect: float, margin: float = 1.12) -> Camera:
-        """As near as shows all points (N, 3), NaN left out, in a picture of width / height ``aspect``."""
+        """As near as shows all points (N, 3), NaN left out, in a picture of width / height ``aspect``.
+
+        No point comes nearer to the camera than ``NEAREST``, which can leave room beside a single near one.
+        """
         points = np.asarray(points, dtype=float).reshape(-1, 3)
         points = points[np.isfinite(points).all(axis=1)]
         if not len(points):
@@ -122,7 +125,9 @@ class Camera:
         lean = np.zeros(len(points)) if self.parallel else seen[:, 2]
         high = (seen[:, :2] + lean[:, None] * reach).max(axis=0)
         low = (-seen[:, :2] + lean[:, None] * reach).max(axis=0)
-        distance = float(np.clip((0.5 * (high + low) / reach).max(), 0.3, FARTHEST))
+        # Where the nearest point bounds the picture on both sides, the planes meet in it: the camera would be there.
+        least = max(0.3, seen[:, 2].max() + NEAREST)
+        distance = float(np.clip((0.5 * (high + low) / reach).max(), least, max(least, FARTHEST)))
         x, y, z = (float(c) for c in middle + 0.5 * (high - low) @ basis[:2])
         return replace(self, target=(x, y, z), distance=distance)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from PySide6.QtCore import QEvent, QItemSelection, QItemSelectionModel, QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QContextMenuEvent, QGuiApplication, QKeyEvent, QKeySequence, QPainter
@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from markerscope.widgets.allow import allow
 from markerscope.widgets.icons import icon
 from markerscope.widgets.tables.columns import Column
 from markerscope.widgets.tables.model import BAR, SWATCH, ArrayModel, Index, SortFilter
@@ -98,6 +99,7 @@ class ArrayTable(QWidget):
         super().__init__(parent)
         self.setAccessibleName(name)
         self.can_pin = can_pin
+        self._unpinnable: Mapping[int, str] = {}
         self.model = ArrayModel(self)
         self._sorted = SortFilter(self)
         self._sorted.setSourceModel(self.model)
@@ -157,6 +159,10 @@ class ArrayTable(QWidget):
             self.set_pinned(pinned)
         self._say_count()
 
+    def set_unpinnable(self, reasons: Mapping[int, str]) -> None:
+        """Say of rows why they cannot be pinned, or let go of, now."""
+        self._unpinnable = dict(reasons)
+
     def set_pinned(self, row: int) -> None:
         """Mark the row that is held, -1 for none."""
         self.model.set_pinned(row)
@@ -210,6 +216,8 @@ class ArrayTable(QWidget):
             text = "Unpin" if row == self.model.pinned else "Pin, and go on from it"
             pin = menu.addAction(icon("pin"), text, lambda: self.pin_requested.emit(row))
             pin.setShortcut(QKeySequence(Qt.Key.Key_P))
+            menu.setToolTipsVisible(True)
+            allow(pin, self._unpinnable.get(row, ""), text)
         board = QGuiApplication.clipboard()
         copy = menu.addAction(icon("copy"), "Copy", lambda: board.setText(self.as_text(selected=True)))
         copy.setEnabled(bool(self.selected_rows()))

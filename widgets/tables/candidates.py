@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from markerscope.widgets.allow import allow
 from markerscope.widgets.icons import icon
 from markerscope.widgets.plots.scales import HEADING, degrees, figure
 from markerscope.widgets.tables.array_table import ArrayTable
@@ -124,8 +125,6 @@ class CandidateTable(QWidget):
         self.setAccessibleName("Candidates")
         self.table = ArrayTable("Candidates", can_pin=True)
         self.pin_button = QPushButton(icon("pin"), "Pin")
-        self.pin_button.setToolTip("Hold this candidate, and go on from it; can be undone (P)")
-        self.pin_button.setEnabled(False)
         self.pin_button.clicked.connect(lambda: self.pin_requested.emit(self.table.current_row()))
         self.table.top.addWidget(self.pin_button)
         self._steps = QHBoxLayout()
@@ -137,10 +136,12 @@ class CandidateTable(QWidget):
         layout.addLayout(self._steps)
         layout.addWidget(self.table, 1)
         self.table.row_selected.connect(self.row_selected)
-        self.table.row_selected.connect(lambda row: self.pin_button.setEnabled(row >= 0))
+        self.table.row_selected.connect(lambda row: self._allow())
         self.table.row_activated.connect(self.row_activated)
         self.table.pin_requested.connect(self.pin_requested)
         self._known: tuple[Any, ...] = ()
+        self._reasons: Sequence[str] = ()
+        self._allow()
 
     def set_steps(self, steps: Sequence[Any], current: str = "") -> None:
         """Offer the steps of the search; the rows of one are shown, all of them where ``current`` is none."""
@@ -176,9 +177,16 @@ class CandidateTable(QWidget):
         unit: str = "",
         colours: np.ndarray | None = None,
         meaning: str = "",
+        reasons: Sequence[str] = (),
     ) -> None:
-        """Show candidates, see :func:`candidate_columns`; more may come while the search runs."""
+        """Show candidates, see :func:`candidate_columns`; more may come while the search runs.
+
+        ``reasons`` say of each row why it cannot be pinned (or let go of) now, "" where it can.
+        """
         self.table.set_columns(candidate_columns(rows, score, unit, colours, meaning), pinned)
+        self._reasons = tuple(reasons)
+        self.table.set_unpinnable({row: reason for row, reason in enumerate(reasons) if reason})
+        self._allow()
 
     def _keep(self, name: str) -> None:
         kept = next((step.rows for step in self._known if step.name == name), None)
@@ -191,4 +199,13 @@ class CandidateTable(QWidget):
     def set_selected(self, row: int) -> None:
         """Select a row, -1 for none; nothing is emitted."""
         self.table.set_selected([row] if row >= 0 else [])
-        self.pin_button.setEnabled(row >= 0)
+        self._allow()
+
+    def _allow(self) -> None:
+        """Offer to pin the row that is selected, or say why it cannot be."""
+        row = self.table.current_row()
+        reason = self._reasons[row] if 0 <= row < len(self._reasons) else "" if row >= 0 else "no candidate is selected"
+        held = row >= 0 and row == self.table.model.pinned
+        self.pin_button.setText("Unpin" if held else "Pin")
+        tip = "Go on from the best candidate again" if held else "Hold this candidate, and go on from it"
+        allow(self.pin_button, reason, f"{tip}; can be undone (P)")

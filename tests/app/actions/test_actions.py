@@ -324,9 +324,10 @@ def test_colours_and_layers(actions: Actions, bench: Workbench) -> None:
 
 
 def test_what_only_a_window_can_do_is_asked_of_it(actions: Actions, asks: Answers) -> None:
-    for name in ("camera.front", "help.search", "theme.dark"):
+    for name in ("help.shortcuts", "help.search", "theme.dark"):
         assert actions.trigger(name)
-    assert asks.asked == ["camera.front", "help.search", "theme.dark"]
+    assert asks.asked == ["help.shortcuts", "help.search", "theme.dark"]
+    assert not actions.trigger("camera.front"), "there is nothing to look at"
 
 
 def test_running_what_is_there_says_so(actions: Actions, solved: Workbench, said: list[Said]) -> None:

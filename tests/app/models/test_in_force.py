@@ -24,8 +24,10 @@ from markerscope.app.models.history import History, Step
 from markerscope.app.models.home import Home
 from markerscope.app.models.results import Ref
 from markerscope.app.models.stages import StageBoard
+from markerscope.solver.commands.solve import solve_session
+from markerscope.solver.core.request import SolveRequest
 from markerscope.solver.pipeline.run import keys_of
-from markerscope.solver.pipeline.session import InputFile, Session, save_session
+from markerscope.solver.pipeline.session import InputFile, Session, load_session, save_session
 
 
 @dataclass
@@ -34,6 +36,8 @@ class State:
 
     session: Session
     answers: dict[str, list[str]] = field(default_factory=dict)
+    before: list[Session] = field(default_factory=list)
+    """What it was in other words, before it was saved."""
 
 
 class Walk(RuleBasedStateMachine):
@@ -133,7 +137,7 @@ class Walk(RuleBasedStateMachine):
                 self.board.results.store.put(stage, keys[stage], 0, {"version": -1, "headline": keys[stage]})
                 self.board.land(Ref(stage, keys[stage]), session)
                 for state in self.line:
-                    if state.session == session:
+                    if session in (state.session, *state.before):
                         state.answers.setdefault(stage, []).append(keys[stage])
             else:
                 self.board.end()
@@ -177,6 +181,7 @@ class Walk(RuleBasedStateMachine):
     @rule()
     def save(self) -> None:
         self.document.save()
+        self.line[self.at].before.append(self.line[self.at].session)
         self.line[self.at].session = self.document.session
         self._record()
 
@@ -217,7 +222,7 @@ class Walk(RuleBasedStateMachine):
 
 TestWalk = Walk.TestCase
 TestWalk.settings = settings(
-    max_examples=30, stateful_step_count=14, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True
+    max_examples=10, stateful_step_count=14, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True
 )
 
 
@@ -267,6 +272,16 @@ def test_a_result_that_arrives_after_the_next_edit_is_the_last_one_in_force(walk
     walk.what_there_is_to_draw_was_the_answer()
 
 
+def test_a_result_that_arrives_after_saving_and_the_next_edit_is_the_last_one_in_force(walk: Walk) -> None:
+    walk.start_a_run()
+    wanted = walk.board.keys["fit"]
+    walk.save()
+    walk.edit(1)
+    walk.a_run_ends_that_was_started_before(13)
+    assert walk.board.latest("fit") == (wanted, False)
+    walk.what_there_is_to_draw_was_the_answer()
+
+
 def test_a_result_of_another_program_is_found_before_its_settings_are_left(walk: Walk) -> None:
     walk.another_program_runs_the_session()
     wanted = walk.board.keys["fit"]
@@ -287,6 +302,21 @@ def test_what_was_in_force_is_drawn_after_closing_and_opening(walk: Walk) -> Non
     walk.edit(1)
     walk.crash_and_open()
     assert walk.board.latest("fit") == (kept, False)
+
+
+def test_what_the_command_line_solved_is_drawn_after_its_file_was_edited_by_hand(
+    session: Session, tmp_path: Path
+) -> None:
+    wanted = keys_of(session)["fit"]
+    solve_session(SolveRequest(session.folder))
+    solved = load_session(session.folder)
+    save_session(edits.set_offset(solved, 0.2).session)
+    document = Document(Home(tmp_path / "config", tmp_path / "data"))
+    document.open(session.folder)
+    board = StageBoard(document)
+    assert board.latest("fit") == (wanted, False)
+    assert board.state("fit") == "stale"
+    document.close()
 
 
 def _step(session: Session, merge: str = "", **answers: str) -> Step:

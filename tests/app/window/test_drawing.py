@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PySide6.QtCore import Qt
 
 from markerscope.app.window.collecting import Collecting
 from markerscope.app.window.main import MainWindow
@@ -42,8 +43,9 @@ def test_the_body_is_coarse_while_the_clock_moves_and_full_when_it_rests(solved:
     settle(solved, spin)
     full = to_rgb(scene.grab().toImage()).astype(int)
     scene.patience_ms, start = 0.0, clock.time
-    clock.seek(start + 0.3)
-    clock.seek(start)
+    for time in (start + 0.3, start):
+        clock.seek(time)
+        solved.draw_now()
     assert not scene.fine
     coarse = to_rgb(scene.grab().toImage()).astype(int)
     part = (np.abs(coarse - full).max(axis=2) > 30).mean()
@@ -53,11 +55,41 @@ def test_the_body_is_coarse_while_the_clock_moves_and_full_when_it_rests(solved:
     settle(solved, spin)
     assert scene.fine
     solved.bench.selection.select_markers([2])
+    solved.draw_now()
     assert scene.fine, "what rests stays as it is while something else changes"
     scene.patience_ms = 1e9
     clock.seek(start + 0.3)
+    solved.draw_now()
     scene.grab()
     assert scene.fine, "where it is quick, it is full while it moves too"
+
+
+def test_a_click_draws_the_scene_once(solved: MainWindow, spin: Spin, monkeypatch: pytest.MonkeyPatch) -> None:
+    window, bench = solved, solved.bench
+    spin(lambda: window.shown.get("orient") is not None and bench.frames is not None and bench.frames.done, "all")
+    settle(window, spin)
+    drawn: list[str] = []
+    for view, method in ((window.scene, "set_markers"), (window.video, "set_markers"), (window.scene, "set_trails")):
+        real, name = getattr(view, method), f"{type(view).__name__}.{method}"
+        monkeypatch.setattr(view, method, lambda *a, real=real, name=name: (drawn.append(name), real(*a)))
+    marker = int(np.flatnonzero(np.isfinite(window.scene._stage.markers).all(axis=1))[0])
+    clicks: dict[str, Callable[[], object]] = {
+        "marker": lambda: window.scene.marker_clicked.emit(marker, Qt.KeyboardModifier.NoModifier),
+        "candidate": lambda: window.candidates.row_selected.emit(0),
+        "hypothesis": lambda: window.hypotheses.hypothesis_selected.emit(1),
+        "stage": lambda: bench.selection.select(stage="fit"),
+        "neutral stage": lambda: bench.selection.select(stage="neutral"),
+        "iteration": lambda: window.convergence.iteration_chosen.emit(0, 1),
+        "nothing": lambda: window.scene.background_clicked.emit(Qt.KeyboardModifier.NoModifier),
+        "layer": lambda: window.table.trigger("layer.trails"),
+        "worst": lambda: window.markers.worst_requested.emit(marker, bench.clock.time + 0.1),
+    }
+    for what, click in clicks.items():
+        drawn.clear()
+        click()
+        spin()
+        counts = {name: drawn.count(name) for name in set(drawn)}
+        assert set(counts.values()) == {1} and len(counts) == 3, (what, counts)
 
 
 def test_the_answers_have_pictures(solved: MainWindow, spin: Spin) -> None:
