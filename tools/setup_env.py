@@ -149,7 +149,7 @@ def install_system_libraries(development: bool) -> None:
     missing = needed + wished
     if not missing:
         return
-    line = f"apt-get install -y --no-install-recommends {' '.join(missing)}"
+    line = f"apt-get install -y --no-install-recommends -o APT::Keep-Downloaded-Packages=false {' '.join(missing)}"
     if not shutil.which("apt-get"):
         say(f"these system libraries seem to be missing, install what holds them: {' '.join(missing)}")
     elif os.geteuid() == 0:

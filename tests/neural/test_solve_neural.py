@@ -34,7 +34,7 @@ SETTINGS = SynthSettings(frames=75, markers=40, lost=0.04)
 
 @pytest.fixture(scope="module")
 def made() -> SynthSession:
-    return synthesise("reach", SETTINGS, 3)
+    return synthesise("reach", SETTINGS, 4)
 
 
 @pytest.fixture(scope="module")
