@@ -10,7 +10,7 @@ from markerscope.widgets.panels.dated import Dated
 
 _MARKERS = ("markers", "clean")
 DRAWN: Mapping[str, tuple[str, ...]] = {
-    "scene": (*_MARKERS, "segment", "localize", "solve", "orient", "fit"),
+    "scene": (*_MARKERS, "segment", "localize", "solve", "orient", "fit", "neutral"),
     "video": (*_MARKERS, "landmarks", "sync", "segment", "fit"),
     "affinity": (*_MARKERS, "segment"),
     "candidates": (*_MARKERS, "localize", "orient"),
