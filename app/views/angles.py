@@ -13,6 +13,7 @@ from markerscope.solver.angles.angles import conventions, evidence
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.skeleton import JOINTS
 from markerscope.widgets import palette
+from markerscope.widgets.plots.angle_data import AngleCurve, AnglePlot
 
 Side = Literal["left", "right", ""]
 _LONG = {
@@ -30,39 +31,6 @@ _JOINTS = {
 }  # fmt: skip
 """The joint of the conventions that each of the body's joints belongs to."""
 _COLOURS: dict[Side, RGB] = {"left": palette.LEFT, "right": palette.RIGHT, "": (90, 90, 95)}
-
-
-@dataclass(frozen=True, eq=False)
-class AngleCurve:
-    """One angle of one side.
-
-    Attributes
-    ----------
-    name : its column in the files
-    side : "left", "right", or "" for pelvis and trunk
-    degrees : (T,) NaN where the sequence cannot tell this angle from another
-    reference : (T,) the same of another result on this clock, None where there is none
-    positive : what a positive value means
-    rests_on : "markers", "one segment" (only one of the two carries markers) or "video only"; "" if unknown
-    colour : of its side
-    """
-
-    name: str
-    side: Side
-    degrees: np.ndarray
-    reference: np.ndarray | None
-    positive: str
-    rests_on: str
-    colour: RGB
-
-
-@dataclass(frozen=True, eq=False)
-class AnglePlot:
-    """One angle, of both sides where there are two: its joint, its title, and its curves."""
-
-    joint: str
-    title: str
-    curves: tuple[AngleCurve, ...]
 
 
 @dataclass(frozen=True, eq=False)

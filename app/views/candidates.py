@@ -16,6 +16,7 @@ from markerscope.solver.fit.confidence import same_answer
 from markerscope.solver.fit.counting import candidate_number
 from markerscope.solver.fit.published.results import PaperLocalization
 from markerscope.solver.fit.results import Localization, Orientation
+from markerscope.widgets.tables.candidate_data import CandidateRecord, SearchStep
 
 Fate = Literal["found", "too alike", "kept", "left behind", "merged", "scored", "refined"]
 """How far a way got: see ``FATES``."""
@@ -39,56 +40,20 @@ MEANING = {
 """What the scores mean."""
 
 
-@dataclass(frozen=True)
-class CandidateRow:
-    """One way to put the markers on the body.
+@dataclass(frozen=True, kw_only=True)
+class CandidateRow(CandidateRecord):
+    """A row of the table, and what it is a row of.
 
     Attributes
     ----------
     pool : its row in the localization: a hypothesis, or a chain; -1 for an answer that has none of its own
     candidate : its row in the orientation, by which it is pinned; -1 if it is not there
-    fate : how far it got
-    part : the bones that carry markers, in words
-    bones : their names, from the pelvis outwards
-    yaw_deg : degrees, the yaw it was started from, or ended at where the method fits it; NaN if it has none
-    heading_deg : degrees, which way the camera looks about the vertical; NaN if unknown
-    distance : mm, root mean square from the markers to the body before any pose is changed; NaN if not laid over
-    score : what it is ranked by, see ``CandidateTable.score``; NaN if not scored
-    margin : score over the best one's, 1 for that; NaN if not scored, or scored on other frames than the best
-    covered : share 0..1 of the markers that are near the body, see ``coverage``; NaN where nobody asked
-    same_as_first : whether it is the first candidate's answer found once more
-    in_use : whether the fit goes on from it
     can_pin : whether the fit can be told to go on from it
     """
 
-    pool: int
-    candidate: int
-    fate: Fate
-    part: str
-    bones: tuple[str, ...]
-    yaw_deg: float = float("nan")
-    heading_deg: float = float("nan")
-    distance: float = float("nan")
-    score: float = float("nan")
-    margin: float = float("nan")
-    covered: float = float("nan")
-    same_as_first: bool = False
-    in_use: bool = False
+    pool: int = -1
+    candidate: int = -1
     can_pin: bool = False
-
-    @property
-    def number(self) -> int:
-        """The candidate's number, by which every other view calls it; 0 for one that has none."""
-        return candidate_number(self.candidate) if self.candidate >= 0 else 0
-
-
-@dataclass(frozen=True)
-class Step:
-    """One step of the selection: its name, what happened there, and the rows that are in it."""
-
-    name: str
-    help: str
-    rows: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -104,7 +69,7 @@ class CandidateTable:
     """
 
     rows: tuple[CandidateRow, ...]
-    steps: tuple[Step, ...]
+    steps: tuple[SearchStep, ...]
     score: str
     unit: str
     meaning: str = ""
@@ -178,7 +143,7 @@ def part_of_bones(bones: np.ndarray) -> str:
 
 def _of_hypotheses(
     found: Localization, ranked: Orientation | None
-) -> tuple[tuple[CandidateRow, ...], tuple[Step, ...]]:
+) -> tuple[tuple[CandidateRow, ...], tuple[SearchStep, ...]]:
     place = {} if ranked is None else {c.hypothesis: i for i, c in enumerate(ranked.candidates)}
     rows = []
     for h in range(len(found.start)):
@@ -186,6 +151,7 @@ def _of_hypotheses(
         row = CandidateRow(
             pool=h,
             candidate=place.get(h, -1),
+            number=_number(place.get(h, -1)),
             fate="found" if ranked is None else "merged",
             part=part_of_bones(found.bone[h]),
             bones=bone_names(found.bone[h]),
@@ -201,12 +167,17 @@ def _of_hypotheses(
     refined = [i for i in relaxed if rows[i].fate in ("refined", "merged")]
     ends = [i for i in refined if rows[i].fate == "refined"]
     steps = (
-        Step("Pool", "Ways to put the markers on the video's body, found without changing its pose.", _all(rows)),
-        Step("Scored", "Relaxed on a few keyframes, markers on whole vertices.", tuple(relaxed)),
-        Step("Kept", "The best, no more than two alike: relaxed on all keyframes, markers free.", tuple(refined)),
-        Step("Refined", "What did not run into a better one, to the end.", tuple(ends)),
+        SearchStep("Pool", "Ways to put the markers on the video's body, found without changing its pose.", _all(rows)),
+        SearchStep("Scored", "Relaxed on a few keyframes, markers on whole vertices.", tuple(relaxed)),
+        SearchStep("Kept", "The best, no more than two alike: relaxed on all keyframes, markers free.", tuple(refined)),
+        SearchStep("Refined", "What did not run into a better one, to the end.", tuple(ends)),
     )
     return tuple(rows), steps
+
+
+def _number(candidate: int) -> int:
+    """The number by which every view calls a row of the orientation; 0 for one that is not there."""
+    return candidate_number(candidate) if candidate >= 0 else 0
 
 
 def _relaxed(row: CandidateRow, ranked: Orientation) -> CandidateRow:
@@ -229,7 +200,7 @@ def _relaxed(row: CandidateRow, ranked: Orientation) -> CandidateRow:
 
 def _of_chains(
     found: PaperLocalization, ranked: Orientation | None
-) -> tuple[tuple[CandidateRow, ...], tuple[Step, ...]]:
+) -> tuple[tuple[CandidateRow, ...], tuple[SearchStep, ...]]:
     answers = _yaws(ranked)
     chains = _chains(found, ranked)
     rows = (*answers, *chains)
@@ -239,10 +210,10 @@ def _of_chains(
     scored = tuple(i for i in kept if rows[i].fate == "scored")
     size = found.pruned.shape[1] if found.pruned.ndim == 2 and len(found.pruned) else found.groups
     steps = (
-        Step("Pool", f"All connected chains of {size} bones, one for each group of markers.", pool),
-        Step("Pruned", "Less those that nearly repeat another.", kept),
-        Step("Scored", _said_scored(found), scored),
-        Step("Refined", "Every yaw solved in five stages.", tuple(range(first))),
+        SearchStep("Pool", f"All connected chains of {size} bones, one for each group of markers.", pool),
+        SearchStep("Pruned", "Less those that nearly repeat another.", kept),
+        SearchStep("Scored", _said_scored(found), scored),
+        SearchStep("Refined", "Every yaw solved in five stages.", tuple(range(first))),
     )
     return rows, steps
 
@@ -260,7 +231,9 @@ def _yaws(ranked: Orientation | None) -> tuple[CandidateRow, ...]:
     rows = []
     for i, own in enumerate(ranked.candidates):
         if own.refined:
-            row = CandidateRow(-1, i, "refined", own.part, bone_names(own.bone))
+            row = CandidateRow(
+                candidate=i, number=_number(i), fate="refined", part=own.part, bones=bone_names(own.bone)
+            )
             rows.append(_relaxed(row, ranked))
     return tuple(rows)
 
@@ -276,6 +249,7 @@ def _chains(found: PaperLocalization, ranked: Orientation | None) -> tuple[Candi
             CandidateRow(
                 pool=int(row),
                 candidate=place.get(int(row), -1),
+                number=_number(place.get(int(row), -1)),
                 fate="scored",
                 part=part_of_bones(fit.bones),
                 bones=bone_names(fit.bones),
@@ -286,14 +260,15 @@ def _chains(found: PaperLocalization, ranked: Orientation | None) -> tuple[Candi
             )
         )
     for i in range(len(found.candidates), len(found.pruned)):
-        rows.append(CandidateRow(i, -1, "kept", part_of_bones(found.pruned[i]), bone_names(found.pruned[i])))
+        bones = found.pruned[i]
+        rows.append(CandidateRow(pool=i, fate="kept", part=part_of_bones(bones), bones=bone_names(bones)))
     kept = {frozenset(int(j) for j in chain) for chain in found.pruned}
     size = found.pruned.shape[1] if found.pruned.ndim == 2 else 0
     if size:
         for chain in subtrees(size):
             if chain not in kept:
                 bones = np.array(sorted(chain))
-                rows.append(CandidateRow(-1, -1, "too alike", part_of_bones(bones), bone_names(bones)))
+                rows.append(CandidateRow(fate="too alike", part=part_of_bones(bones), bones=bone_names(bones)))
     return tuple(rows)
 
 

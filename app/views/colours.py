@@ -11,6 +11,7 @@ import numpy as np
 from markerscope.app.views.tracks import FILLED, LOST, MEASURED, OUTLIER, STATE_NAMES
 from markerscope.solver.core.skeleton import BONES, JOINTS
 from markerscope.widgets import palette
+from markerscope.widgets.colour_bar import ColourBar
 
 ColourBy = Literal["cluster", "bone", "residual", "gaps", "selection"]
 RGB = tuple[int, int, int]
@@ -21,24 +22,11 @@ RESIDUAL_LIMIT_M = 0.03
 
 
 @dataclass(frozen=True)
-class Scale:
-    """A colour bar: the ends of its range in ``unit``, and the name of its colours in
-    ``markerscope.widgets.palette``.
-    """
-
-    lo: float
-    hi: float
-    unit: str
-    name: str = "viridis"
-
-
-@dataclass(frozen=True)
 class Legend:
     """What colours mean: a title with either entries (text, colour) or a colour bar."""
 
     title: str
-    entries: tuple[tuple[str, RGB], ...] = ()
-    scale: Scale | None = None
+    entries: tuple[tuple[str, RGB], ...] | ColourBar
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +56,7 @@ def by_bone(marker_joint: np.ndarray) -> Coloured:
 def by_residual(residual: np.ndarray, limit: float = RESIDUAL_LIMIT_M) -> Coloured:
     """By the distance (M,) m of each marker from where the body puts it; grey where there is none."""
     colours = palette.sequential(1000 * residual, 0.0, 1000 * limit)
-    return Coloured(colours, Legend("Residual", scale=Scale(0.0, 1000 * limit, "mm")))
+    return Coloured(colours, Legend("Residual", ColourBar(0.0, 1000 * limit, "mm")))
 
 
 def by_state(state: np.ndarray) -> Coloured:

@@ -11,6 +11,7 @@ from markerscope.solver.fit.counting import candidate_number
 from markerscope.solver.fit.published.results import Descent, PaperLocalization, PaperSolve, Trace
 from markerscope.solver.fit.results import Candidate, Orientation
 from markerscope.widgets import palette
+from markerscope.widgets.plots.convergence_data import EnergyCurve
 from markerscope.widgets.plots.scales import degrees
 
 _CHAINS_SHOWN = 5
@@ -19,28 +20,17 @@ TO_THE_END = "all phases"
 
 
 @dataclass(frozen=True, eq=False)
-class EnergyCurve:
-    """One descent.
+class TracedCurve(EnergyCurve):
+    """A descent, and what is known of the body on the way.
 
     Attributes
     ----------
-    stage : of the solve, in words; only curves of one stage have the same energy
-    label : which candidate or yaw
     candidate : its row in the orientation, -1 if it has none
-    iteration, energy : (n,)
-    colour : of the candidate, whatever the stage
-    ended : how it ended, "" where that is not known
     trace : poses at the iterations, where the method keeps them: then row k is iteration ``iteration[k]``
     vertex : (U,) of each marker in that stage, (0,) before any were given
     """
 
-    stage: str
-    label: str
-    candidate: int
-    iteration: np.ndarray
-    energy: np.ndarray
-    colour: RGB
-    ended: str = ""
+    candidate: int = -1
     trace: Trace | None = None
     vertex: np.ndarray | None = None
 
@@ -49,11 +39,11 @@ class EnergyCurve:
         return max(0, int(np.searchsorted(self.iteration, iteration, side="right")) - 1)
 
 
-def of_orientation(ranked: Orientation) -> tuple[EnergyCurve, ...]:
+def of_orientation(ranked: Orientation) -> tuple[TracedCurve, ...]:
     """The default method's descents, one a candidate; between its phases the terms are weighed anew, so curves jump."""
     colours = palette.categorical(len(ranked.candidates))
     return tuple(
-        EnergyCurve(
+        TracedCurve(
             stage=TO_THE_END if own.refined else "first phases, then left behind",
             label=f"{candidate_number(i)}: {own.part}, camera heading {degrees(own.heading_deg)}°",
             candidate=i,
@@ -84,7 +74,7 @@ def _trace(own: Candidate) -> Trace | None:
 
 def of_paper(
     found: PaperLocalization, solved: PaperSolve | None = None, ranked: Orientation | None = None
-) -> tuple[EnergyCurve, ...]:
+) -> tuple[TracedCurve, ...]:
     """The published method's descents: the best chains, then stages 2, 4 and 5 of every yaw."""
     curves = []
     nothing = np.zeros(0, dtype=np.intp)
@@ -115,7 +105,7 @@ def _rows(ranked: Orientation | None, *, refined: bool) -> dict[int, int]:
     return {own.hypothesis: i for i, own in enumerate(ranked.candidates) if own.refined == refined}
 
 
-def _curve(stage: str, label: str, row: int, descent: Descent, colour: RGB, vertex: np.ndarray) -> EnergyCurve:
+def _curve(stage: str, label: str, row: int, descent: Descent, colour: RGB, vertex: np.ndarray) -> TracedCurve:
     ended = "converged" if descent.converged else f"stopped at the cap of {descent.iterations} iterations"
     trace = descent.trace
-    return EnergyCurve(stage, label, row, trace.iteration, trace.energy, colour, ended, trace, vertex)
+    return TracedCurve(stage, label, trace.iteration, trace.energy, colour, ended, row, trace, vertex)

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from markerscope.app.views.colours import RGB, rgb
+from markerscope.app.views.colours import rgb
 from markerscope.solver.fit.confidence import same_answer
 from markerscope.solver.fit.counting import candidate_number
 from markerscope.solver.fit.doubts.rules import Verdict
 from markerscope.solver.fit.published.results import PaperSolve
 from markerscope.solver.fit.results import Candidate, Orientation
 from markerscope.widgets import palette
+from markerscope.widgets.panels.hypothesis_data import Hypothesis, Term
 
 TERMS = {
     "markers": ("markers", "distance of the markers from their places on the body"),
@@ -28,47 +29,6 @@ TERMS = {
 
 
 @dataclass(frozen=True)
-class Term:
-    """One part of an energy: its name, what it is called and measures, its value and its colour."""
-
-    name: str
-    title: str
-    help: str
-    value: float
-    colour: RGB
-
-
-@dataclass(frozen=True)
-class HypothesisCard:
-    """One answer.
-
-    Attributes
-    ----------
-    candidate : its row in the orientation, by which it is pinned
-    title : the part of the body, in words
-    heading_deg : degrees, which way the camera looks about the vertical; 0 along the lab's first axis
-    start_deg : degrees, the yaw added before it was solved; NaN where the method has none
-    energy : what the answers are ranked by
-    terms : that it is made of, all cards in the same order
-    margin : energy over the first card's: 1 for that itself
-    same_as_first : whether it is the first answer found once more
-    runner_up : whether it is the best different answer
-    in_use : whether the fit goes on from it
-    """
-
-    candidate: int
-    title: str
-    heading_deg: float
-    start_deg: float
-    energy: float
-    terms: tuple[Term, ...]
-    margin: float
-    same_as_first: bool
-    runner_up: bool
-    in_use: bool
-
-
-@dataclass(frozen=True)
 class HypothesesPicture:
     """The refined answers, best first.
 
@@ -79,7 +39,7 @@ class HypothesesPicture:
     sentence : how sure the first is, in words
     """
 
-    cards: tuple[HypothesisCard, ...]
+    cards: tuple[Hypothesis, ...]
     highest: float
     sentence: str
 
@@ -110,7 +70,7 @@ def hypotheses_picture(
         energies = _energies(own, solved)
         terms = tuple(Term(n, *TERMS.get(n, (n, n)), energies.get(n, 0.0), colours[n]) for n in names)
         cards.append(
-            HypothesisCard(
+            Hypothesis(
                 candidate=i,
                 title=f"{candidate_number(i)}: {own.part}",
                 heading_deg=own.heading_deg,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from markerscope.app.views.colours import bone_name
@@ -11,43 +9,7 @@ from markerscope.app.views.tracks import MEASURED, MarkerTracks
 from markerscope.solver.clustering.segment import Segmentation
 from markerscope.solver.fit.doubts.rules import Verdict
 from markerscope.solver.fit.results import FittedMotion
-
-
-@dataclass(frozen=True, eq=False)
-class MarkerTable:
-    """Columns of M markers.
-
-    Attributes
-    ----------
-    labels : names as the file has them
-    measured : per cent of the frames
-    gaps : stretches without a measurement, those at the ends included
-    longest_gap : s
-    group : of markers that move together, counted from 1; 0 for none
-    bone : the bone it was given to, "" for none; with "(doubtful)" where it stays over 20 mm from its place, "nobody's"
-        where it was left out as somebody else's or a thing's
-    mean, p95, worst : mm, distance from where the body puts it; NaN where it was not used
-    worst_frame : frame of the worst, -1 without any
-    worst_time : s, marker clock
-    landmark : bony landmark that it was drawn to, "" for none
-    probability : per cent that it sits there, NaN where there is none
-    beside : mm from there, NaN where there is none
-    """
-
-    labels: tuple[str, ...]
-    measured: np.ndarray
-    gaps: np.ndarray
-    longest_gap: np.ndarray
-    group: np.ndarray
-    bone: tuple[str, ...]
-    mean: np.ndarray
-    p95: np.ndarray
-    worst: np.ndarray
-    worst_frame: np.ndarray
-    worst_time: np.ndarray
-    landmark: tuple[str, ...]
-    probability: np.ndarray
-    beside: np.ndarray
+from markerscope.widgets.tables.marker_data import MarkerRows
 
 
 def marker_table(
@@ -55,7 +17,7 @@ def marker_table(
     segmentation: Segmentation | None = None,
     motion: FittedMotion | None = None,
     verdict: Verdict | None = None,
-) -> MarkerTable:
+) -> MarkerRows:
     """The markers of a session as far as they are known; those that the rules doubt are marked beside their bone."""
     width = tracks.state.shape[1]
     measured = tracks.state == MEASURED
@@ -66,7 +28,7 @@ def marker_table(
     named = ("",) * width if drawn is None else drawn.landmark
     chance, beside = (np.full(width, np.nan),) * 2 if drawn is None else (100 * drawn.probability, 1000 * drawn.after)
     mean, p95, worst, frame = _residuals(np.full((1, width), np.nan) if motion is None else motion.residual)
-    return MarkerTable(
+    return MarkerRows(
         labels=tracks.markers.labels,
         measured=100 * measured.mean(axis=0),
         gaps=gaps,
@@ -76,7 +38,6 @@ def marker_table(
         mean=mean,
         p95=p95,
         worst=worst,
-        worst_frame=frame,
         worst_time=np.where(frame < 0, np.nan, tracks.markers.first_time + frame / tracks.markers.rate),
         landmark=tuple(name.replace("_", " ") for name in named),
         probability=np.where([bool(name) for name in named], chance, np.nan),

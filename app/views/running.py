@@ -12,16 +12,16 @@ from markerscope.app.views.candidates import (
     MEANING,
     CandidateRow,
     CandidateTable,
-    Step,
     bone_names,
     candidate_table,
     part_of_bones,
 )
 from markerscope.app.views.colours import rgb
-from markerscope.app.views.convergence import EnergyCurve
+from markerscope.app.views.convergence import TracedCurve
 from markerscope.solver.core.progress import Found
 from markerscope.solver.fit.results import Localization
 from markerscope.widgets import palette
+from markerscope.widgets.tables.candidate_data import SearchStep
 
 
 def candidates_so_far(notes: Sequence[Found], found: Localization | None = None) -> CandidateTable | None:
@@ -39,7 +39,7 @@ def candidates_so_far(notes: Sequence[Found], found: Localization | None = None)
     if chains:
         rows = sorted((_of_chain(note) for note in chains), key=lambda row: row.score)
         wanted = int(chains[0].values["of"])
-        step = Step("Scored", f"{len(chains)} of {wanted} chains laid over the markers so far.", _all(rows))
+        step = SearchStep("Scored", f"{len(chains)} of {wanted} chains laid over the markers so far.", _all(rows))
         return CandidateTable(_with_margin(rows), (step,), *CHAMFER, MEANING[CHAMFER[0]])
     ranked = {index: note for (kind, index), note in latest.items() if kind == "candidate"}
     if not ranked or found is None:
@@ -57,7 +57,7 @@ def candidates_so_far(notes: Sequence[Found], found: Localization | None = None)
     return CandidateTable(_with_margin(rows), steps, plain.score, plain.unit, plain.meaning)
 
 
-def curves_so_far(notes: Sequence[Found]) -> tuple[EnergyCurve, ...]:
+def curves_so_far(notes: Sequence[Found]) -> tuple[TracedCurve, ...]:
     """The descents so far, one for each optimisation in the order they began."""
     paths: dict[str, list[Found]] = {}
     for note in notes:
@@ -65,7 +65,7 @@ def curves_so_far(notes: Sequence[Found]) -> tuple[EnergyCurve, ...]:
             paths.setdefault(str(note.values["text"]), []).append(note)
     colours = palette.categorical(len(paths))
     return tuple(
-        EnergyCurve(
+        TracedCurve(
             stage="running",
             label=text,
             candidate=-1,

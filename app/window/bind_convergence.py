@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from markerscope.app.models.workbench import Workbench
-from markerscope.app.views.convergence import TO_THE_END, EnergyCurve, of_orientation, of_paper
+from markerscope.app.views.convergence import TO_THE_END, TracedCurve, of_orientation, of_paper
 from markerscope.app.views.running import curves_so_far
 from markerscope.app.window.ghosts import Ghosts
 from markerscope.app.window.shown import Shown
@@ -16,7 +16,7 @@ class ConvergenceBinder:
 
     def __init__(self, widget: ConvergenceView, bench: Workbench, shown: Shown, ghosts: Ghosts) -> None:
         self.widget, self.bench, self.shown, self.ghosts = widget, bench, shown, ghosts
-        self.curves: tuple[EnergyCurve, ...] = ()
+        self.curves: tuple[TracedCurve, ...] = ()
         self._telling = False
         shown.changed.connect(self._changed)
         bench.runner.found.connect(self._found)
@@ -26,7 +26,7 @@ class ConvergenceBinder:
 
     def fill(self) -> None:
         """Show the descents that there are."""
-        so_far: tuple[EnergyCurve, ...] = ()
+        so_far: tuple[TracedCurve, ...] = ()
         if self.bench.runner.running:
             so_far = curves_so_far([note for notes in self.bench.runner.notes.values() for note in notes])
         curves = so_far or self._results()
@@ -34,7 +34,7 @@ class ConvergenceBinder:
             self.curves = curves
             self.widget.set_curves(curves, TO_THE_END)
 
-    def _results(self) -> tuple[EnergyCurve, ...]:
+    def _results(self) -> tuple[TracedCurve, ...]:
         found, ranked, solved = (self.shown.get(name) for name in ("localize", "orient", "solve"))
         from markerscope.solver.fit.published.results import PaperLocalization
 

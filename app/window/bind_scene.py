@@ -18,8 +18,8 @@ from markerscope.app.window.keys import how
 from markerscope.app.window.once import Once
 from markerscope.app.window.shown import Shown
 from markerscope.widgets import palette, theme
-from markerscope.widgets.scene import ColourBar, Scene3D
 from markerscope.widgets.scene import Legend as Drawn
+from markerscope.widgets.scene import Scene3D
 
 _NONE = np.zeros((0, 3))
 _IVORY = (238, 230, 210)
@@ -193,10 +193,9 @@ class SceneBinder:
             return
         self._legend = legend, ghosts, old
         others = Drawn("Ghosts", ghosts) if ghosts else None
-        scale = legend.scale
         self.widget.set_legend(
             legend.title,
-            legend.entries if scale is None else ColourBar(scale.lo, scale.hi, scale.unit, scale.name),
+            legend.entries,
             Drawn(OUT_OF_DATE, old, others) if old else others,
         )
 

@@ -14,7 +14,7 @@ from markerscope.app.views import bodies
 from markerscope.app.views.bodies import BodyTrack
 from markerscope.app.views.candidates import part_of_bones
 from markerscope.app.views.colours import RGB, rgb
-from markerscope.app.views.convergence import EnergyCurve
+from markerscope.app.views.convergence import TracedCurve
 from markerscope.app.window.shown import Shown
 from markerscope.solver.fit.counting import candidate_number
 from markerscope.solver.fit.results import Localization
@@ -56,12 +56,12 @@ class Ghosts:
         self.changed: Signal[[]] = Signal()
         self.all: tuple[Ghost, ...] = ()
         self.replaces_body = False
-        self._iteration: tuple[EnergyCurve, int] | None = None
+        self._iteration: tuple[TracedCurve, int] | None = None
         shown.changed.connect(self._results)
         shown.dated.connect(lambda stages: self._make())
         bench.selection.changed.connect(self._selected)
 
-    def show_iteration(self, curve: EnergyCurve | None, step: int = 0) -> None:
+    def show_iteration(self, curve: TracedCurve | None, step: int = 0) -> None:
         """Have the body as it was at a row of a descent's trace; None shows the fit again."""
         self._iteration = None if curve is None or curve.trace is None else (curve, step)
         self._make()

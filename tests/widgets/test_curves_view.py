@@ -19,7 +19,8 @@ from markerscope.widgets.panels.hypotheses import HypothesesView
 from markerscope.widgets.panels.transport import Readout, Transport
 from markerscope.widgets.plots.angle_data import AngleCurve, AnglePlot
 from markerscope.widgets.plots.angle_plots import _broken
-from markerscope.widgets.plots.convergence import ConvergenceView, EnergyCurve
+from markerscope.widgets.plots.convergence import ConvergenceView
+from markerscope.widgets.plots.convergence_data import EnergyCurve
 from markerscope.widgets.plots.curves import CurvesView
 from markerscope.widgets.plots.ink import pen, polyline
 from tests.widgets.drawn import distance, pixels

@@ -15,13 +15,15 @@ from markerscope.widgets.panels.hypotheses import HypothesesView
 from markerscope.widgets.panels.stage_panel import StagePanel
 from markerscope.widgets.plots.affinity import AffinityView
 from markerscope.widgets.plots.angle_data import AngleCurve, AnglePlot
-from markerscope.widgets.plots.convergence import ConvergenceView, EnergyCurve
+from markerscope.widgets.plots.convergence import ConvergenceView
+from markerscope.widgets.plots.convergence_data import EnergyCurve
 from markerscope.widgets.plots.curves import CurvesView
 from markerscope.widgets.plots.pair import PairPlot
 from markerscope.widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
 from markerscope.widgets.plots.timelines import Timelines
 from markerscope.widgets.tables.candidates import CandidateTable
-from markerscope.widgets.tables.markers import MarkerRows, MarkerTable
+from markerscope.widgets.tables.marker_data import MarkerRows
+from markerscope.widgets.tables.markers import MarkerTable
 from tests.widgets.drawn import pixels
 
 NONE, INK = np.zeros(0), np.array([0, 0, 255], np.uint8)

@@ -14,7 +14,8 @@ from PySide6.QtWidgets import QApplication
 from markerscope.widgets import theme
 from markerscope.widgets.gallery.tables import candidate_rows, marker_rows
 from markerscope.widgets.tables.array_table import ArrayTable
-from markerscope.widgets.tables.candidates import CandidateTable, SearchStep
+from markerscope.widgets.tables.candidate_data import SearchStep
+from markerscope.widgets.tables.candidates import CandidateTable
 from markerscope.widgets.tables.columns import Column, natural
 from markerscope.widgets.tables.markers import MarkerTable
 from tests.widgets.drawn import distance, pixels

@@ -7,7 +7,8 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QWidget
 
 from markerscope.widgets import palette
-from markerscope.widgets.panels.hypotheses import HypothesesView, Hypothesis, Term
+from markerscope.widgets.panels.hypotheses import HypothesesView
+from markerscope.widgets.panels.hypothesis_data import Hypothesis, Term
 from markerscope.widgets.panels.scene_bar import Choice, SceneBar
 from markerscope.widgets.panels.stage_data import EarlierResult, FieldSpec, StageData, StageProgress
 from markerscope.widgets.panels.stage_panel import StagePanel

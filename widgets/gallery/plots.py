@@ -8,7 +8,8 @@ from PySide6.QtWidgets import QWidget
 from markerscope.widgets import palette
 from markerscope.widgets.plots.affinity import AffinityView
 from markerscope.widgets.plots.angle_data import AngleCurve, AnglePlot
-from markerscope.widgets.plots.convergence import ConvergenceView, EnergyCurve
+from markerscope.widgets.plots.convergence import ConvergenceView
+from markerscope.widgets.plots.convergence_data import EnergyCurve
 from markerscope.widgets.plots.curves import CurvesView
 from markerscope.widgets.plots.pair import PairPlot
 from markerscope.widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow

@@ -7,8 +7,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
 from markerscope.widgets import palette
-from markerscope.widgets.tables.candidates import CandidateRecord, CandidateTable, SearchStep
-from markerscope.widgets.tables.markers import MarkerRows, MarkerTable
+from markerscope.widgets.tables.candidate_data import CandidateRecord, SearchStep
+from markerscope.widgets.tables.candidates import CandidateTable
+from markerscope.widgets.tables.marker_data import MarkerRows
+from markerscope.widgets.tables.markers import MarkerTable
 
 
 def marker_rows(markers: int = 41) -> MarkerRows:

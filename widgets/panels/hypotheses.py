@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFont, QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPalette, QPixmap, QResizeEvent
@@ -22,46 +20,10 @@ from PySide6.QtWidgets import (
 from markerscope.widgets.allow import allow
 from markerscope.widgets.icons import icon
 from markerscope.widgets.panels.energy_bars import EnergyBar, TermKey
+from markerscope.widgets.panels.hypothesis_data import Hypothesis
 from markerscope.widgets.plots.ink import colour, em, pen
 from markerscope.widgets.plots.scales import HEADING, degrees, figure
 from markerscope.widgets.theme import colours
-
-
-@dataclass(frozen=True)
-class Term:
-    """One part of an energy; any object with these attributes will do."""
-
-    name: str
-    title: str
-    help: str
-    value: float
-    colour: tuple[int, int, int]
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """One answer; any object with these attributes will do.
-
-    Attributes
-    ----------
-    candidate : its number, given back by the signals
-    title : the part of the body, in words
-    heading_deg : degrees, which way the camera looks about the vertical
-    energy : what the answers are ranked by
-    terms : that it is made of, all answers in the same order
-    margin : energy over that of the first
-    same_as_first, runner_up, in_use : what it is beside the others
-    """
-
-    candidate: int
-    title: str
-    heading_deg: float
-    energy: float
-    terms: tuple[Term, ...]
-    margin: float
-    same_as_first: bool = False
-    runner_up: bool = False
-    in_use: bool = False
 
 
 class HypothesisCard(QFrame):
@@ -70,7 +32,7 @@ class HypothesisCard(QFrame):
     clicked = Signal(int)
     pin_requested = Signal(int)
 
-    def __init__(self, card: Any, picture: QImage | None, highest: float, parent: QWidget | None = None) -> None:
+    def __init__(self, card: Hypothesis, picture: QImage | None, highest: float, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.card = card
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -214,7 +176,9 @@ class HypothesesView(QWidget):
         self._cards: list[HypothesisCard] = []
         self.set_cards([])
 
-    def set_cards(self, cards: Sequence[Any], pictures: Sequence[QImage | None] = (), sentence: str = "") -> None:
+    def set_cards(
+        self, cards: Sequence[Hypothesis], pictures: Sequence[QImage | None] = (), sentence: str = ""
+    ) -> None:
         """Show answers, the best first, each with a picture or None; ``sentence`` says how sure the first is."""
         while (item := self._row.takeAt(0)) is not None:
             if (old := item.widget()) is not None:

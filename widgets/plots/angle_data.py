@@ -11,16 +11,17 @@ Rgb = tuple[int, int, int]
 
 @dataclass(frozen=True, eq=False)
 class AngleCurve:
-    """One angle of one side; any object with these attributes will do.
+    """One angle of one side.
 
     Attributes
     ----------
     name : its column in the files
     side : "left", "right", or "" for pelvis and trunk
-    degrees : (T,) NaN where it means nothing
-    reference : (T,) the same of another result, None where there is none
+    degrees : (T,) NaN where it means nothing, or cannot be told from another angle
+    reference : (T,) the same of another result on this clock, None where there is none
     positive : what a positive value means
-    rests_on : what it was found from, such as "video only"; "" if unknown
+    rests_on : what it was found from: "markers", "one segment" (of two, one carries markers), "video only"; ""
+        if unknown
     colour : of its side
     """
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QSignalBlocker, QSize, Qt, QTimer, Signal
@@ -12,32 +10,12 @@ from PySide6.QtGui import QIcon, QPixmap
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QSlider, QToolButton, QVBoxLayout, QWidget
 
 from markerscope.widgets.icons import icon
+from markerscope.widgets.plots.convergence_data import EnergyCurve
 from markerscope.widgets.plots.convergence_plot import ConvergencePlot, energy_text
 from markerscope.widgets.plots.ink import colour
 
 _STEP_MS, _PLAY_STEPS = 40, 120
 """Playing takes some five seconds however many iterations there were."""
-
-
-@dataclass(frozen=True, eq=False)
-class EnergyCurve:
-    """One descent; any object with these attributes will do.
-
-    Attributes
-    ----------
-    stage : of the solve, in words
-    label : which candidate
-    iteration, energy : (n,)
-    colour : of the candidate
-    ended : how it ended, in words
-    """
-
-    stage: str
-    label: str
-    iteration: np.ndarray
-    energy: np.ndarray
-    colour: tuple[int, int, int]
-    ended: str = ""
 
 
 class ConvergenceView(QWidget):
@@ -55,7 +33,7 @@ class ConvergenceView(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAccessibleName("Convergence")
-        self._curves: tuple[Any, ...] = ()
+        self._curves: tuple[EnergyCurve, ...] = ()
         self._rows: list[int] = []
         self.stage, self.curve = QComboBox(), QComboBox()
         self.stage.setAccessibleName("Stage of the solve")
@@ -93,8 +71,8 @@ class ConvergenceView(QWidget):
         self.slider.valueChanged.connect(lambda k: self._choose(self.chosen(), k, tell=True))
         self.play.toggled.connect(self._play)
 
-    def set_curves(self, curves: Sequence[Any], preferred: str = "") -> None:
-        """Show descents: objects with stage, label, iteration (n,), energy (n,), colour, ended; more may come.
+    def set_curves(self, curves: Sequence[EnergyCurve], preferred: str = "") -> None:
+        """Show descents; more may come.
 
         Where no stage was chosen before, it is the ``preferred`` one, else the last.
         """

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from PySide6.QtCore import Signal
@@ -22,55 +20,18 @@ from markerscope.widgets.allow import allow
 from markerscope.widgets.icons import icon
 from markerscope.widgets.plots.scales import HEADING, degrees, figure
 from markerscope.widgets.tables.array_table import ArrayTable
+from markerscope.widgets.tables.candidate_data import CandidateRecord, SearchStep
 from markerscope.widgets.tables.columns import Column
 
 MARGIN = "Score over that of the best: near 1 they tie. None where the two were not scored on the same frames"
 
 
-@dataclass(frozen=True)
-class CandidateRecord:
-    """A candidate; any object with these attributes will do.
-
-    Attributes
-    ----------
-    part : the bones that carry markers, in words
-    bones : their names
-    fate : how far it got
-    yaw_deg, heading_deg : degrees, the yaw it started from, and which way the camera looks; NaN if there is none
-    distance : mm, from the markers to the body as first laid over them; NaN if it was not
-    score : what it is ranked by; NaN if not scored
-    margin : score over that of the best
-    covered : share 0..1 of the markers that it explains
-    same_as_first : whether it is the first candidate's answer found once more
-    in_use : whether the fit goes on from it
-    number : by which other views call it, 0 if it has none yet
-    """
-
-    part: str
-    fate: str
-    yaw_deg: float = float("nan")
-    heading_deg: float = float("nan")
-    distance: float = float("nan")
-    score: float = float("nan")
-    margin: float = float("nan")
-    covered: float = float("nan")
-    same_as_first: bool = False
-    in_use: bool = False
-    bones: tuple[str, ...] = ()
-    number: int = 0
-
-
-@dataclass(frozen=True)
-class SearchStep:
-    """A step of the search, by its name, meaning and rows; any object with these attributes will do."""
-
-    name: str
-    help: str
-    rows: tuple[int, ...]
-
-
 def candidate_columns(
-    rows: Sequence[Any], score: str = "Score", unit: str = "", colours: np.ndarray | None = None, meaning: str = ""
+    rows: Sequence[CandidateRecord],
+    score: str = "Score",
+    unit: str = "",
+    colours: np.ndarray | None = None,
+    meaning: str = "",
 ) -> list[Column]:
     """The table of candidates, given what they are ranked by; ``colours`` (N, 3) uint8 are those of their ghosts."""
 
@@ -97,7 +58,7 @@ def candidate_columns(
     ]
 
 
-def _numbers(rows: Sequence[Any], colours: np.ndarray | None) -> Column:
+def _numbers(rows: Sequence[CandidateRecord], colours: np.ndarray | None) -> Column:
     """The candidates' numbers, by which all views call them; their places for as long as none has one."""
     numbers = np.array([row.number for row in rows], float)
     if not numbers.any():
@@ -139,11 +100,11 @@ class CandidateTable(QWidget):
         self.table.row_selected.connect(lambda row: self._allow())
         self.table.row_activated.connect(self.row_activated)
         self.table.pin_requested.connect(self.pin_requested)
-        self._known: tuple[Any, ...] = ()
+        self._known: tuple[SearchStep, ...] = ()
         self._reasons: Sequence[str] = ()
         self._allow()
 
-    def set_steps(self, steps: Sequence[Any], current: str = "") -> None:
+    def set_steps(self, steps: Sequence[SearchStep], current: str = "") -> None:
         """Offer the steps of the search; the rows of one are shown, all of them where ``current`` is none."""
         if [step.name for step in steps] != [step.name for step in self._known]:
             for old in self._group.buttons():
@@ -171,7 +132,7 @@ class CandidateTable(QWidget):
 
     def set_rows(
         self,
-        rows: Sequence[Any],
+        rows: Sequence[CandidateRecord],
         pinned: int = -1,
         score: str = "Score",
         unit: str = "",

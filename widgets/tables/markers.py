@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 from PySide6.QtCore import Signal
@@ -13,43 +11,10 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from markerscope.widgets.plots.scales import clock
 from markerscope.widgets.tables.array_table import ArrayTable
 from markerscope.widgets.tables.columns import Column
+from markerscope.widgets.tables.marker_data import MarkerRows
 
 
-@dataclass(frozen=True, eq=False)
-class MarkerRows:
-    """Markers, one a row; any object with these attributes will do.
-
-    Attributes
-    ----------
-    labels : as in the file
-    measured : (M,) per cent of the frames
-    gaps : (M,) how many
-    longest_gap : (M,) s
-    group : (M,) counted from 1, 0 for none
-    bone : name of the bone each marker sits on, "" for none
-    mean, p95, worst : (M,) mm, residual; NaN before there is a fit
-    worst_time : (M,) s, the moment of the largest
-    landmark : bony landmark that each was drawn to, "" for none
-    probability : (M,) per cent that it sits there
-    beside : (M,) mm from there
-    """
-
-    labels: Sequence[str]
-    measured: np.ndarray
-    gaps: np.ndarray
-    longest_gap: np.ndarray
-    group: np.ndarray
-    bone: Sequence[str]
-    mean: np.ndarray
-    p95: np.ndarray
-    worst: np.ndarray
-    worst_time: np.ndarray
-    landmark: Sequence[str]
-    probability: np.ndarray
-    beside: np.ndarray
-
-
-def marker_columns(rows: Any, colours: np.ndarray | None = None) -> list[Column]:
+def marker_columns(rows: MarkerRows, colours: np.ndarray | None = None) -> list[Column]:
     """The table of markers; ``colours`` (M, 3) uint8 are those of the scene."""
     p95 = np.asarray(rows.p95, float)
     most = float(np.nanmax(p95)) if np.isfinite(p95).any() else 1.0
@@ -94,7 +59,7 @@ class MarkerTable(QWidget):
         self.table.rows_selected.connect(self.markers_selected)
         self.table.row_activated.connect(self._jump)
 
-    def set_rows(self, rows: Any, colours: np.ndarray | None = None) -> None:
+    def set_rows(self, rows: MarkerRows, colours: np.ndarray | None = None) -> None:
         """Show markers, see :class:`MarkerRows` and :func:`marker_columns`."""
         self._worst = np.asarray(rows.worst_time, float)
         self.table.set_columns(marker_columns(rows, colours))

@@ -15,6 +15,7 @@ from markerscope.solver.cleaning.clean import Cut
 from markerscope.solver.clustering.segment import segment
 from markerscope.solver.core.markers import Markers
 from markerscope.widgets import palette
+from markerscope.widgets.colour_bar import ColourBar
 from tests.app.views.conftest import Made
 
 
@@ -109,8 +110,9 @@ def test_residual_colours_run_over_their_bar() -> None:
     table = palette.scale_table()
     assert np.array_equal(found.colours[[0, 2, 3]], table[[0, 255, 255]])
     assert np.array_equal(found.colours[4], palette.LOST)
-    assert found.legend.scale is not None
-    assert (found.legend.scale.lo, found.legend.scale.hi, found.legend.scale.unit) == (0.0, 30.0, "mm")
+    bar = found.legend.entries
+    assert isinstance(bar, ColourBar)
+    assert (bar.lo, bar.hi, bar.unit) == (0.0, 30.0, "mm")
 
 
 def test_state_and_selection_colours_count_what_they_show() -> None:

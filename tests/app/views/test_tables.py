@@ -45,14 +45,13 @@ def test_a_row_says_what_is_known_of_its_marker(made: Made) -> None:
         known = {t: r for t, r in enumerate(made.motion.residual[:, m]) if np.isfinite(r)}
         if m < 12:
             worst = max(known, key=lambda t: known[t])
-            assert table.worst_frame[m] == worst
             assert np.isclose(table.worst_time[m], made.markers.time[worst])
             assert np.isclose(table.worst[m], 1000 * known[worst])
             assert np.isclose(table.mean[m], 1000 * sum(known.values()) / len(known))
             assert np.isclose(table.p95[m], 1000 * np.percentile(list(known.values()), 95))
             assert table.bone[m]
         else:
-            assert table.bone[m] == "" and table.worst_frame[m] == -1
+            assert table.bone[m] == ""
             assert np.isnan([table.mean[m], table.p95[m], table.worst[m], table.worst_time[m]]).all()
     longest = max(len(list(g)) for lost, g in groupby(~made.markers.present[:, 3]) if lost)
     assert np.isclose(table.longest_gap[3], longest / 50.0)
@@ -86,7 +85,7 @@ def test_a_row_says_which_landmark_its_marker_was_drawn_to(made: Made) -> None:
 def test_before_any_result_the_table_tells_of_presence_alone(made: Made) -> None:
     table = marker_table(tracks_of(made.markers))
     assert (table.group == 0).all() and set(table.bone) == {""}
-    assert np.isnan(table.mean).all() and (table.worst_frame == -1).all()
+    assert np.isnan(table.mean).all() and np.isnan(table.worst_time).all()
 
 
 def test_what_was_filled_is_not_measured(made: Made) -> None:
