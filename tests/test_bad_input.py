@@ -345,6 +345,10 @@ def test_a_body_is_looked_at_before_the_video_is_watched(shell: Shell) -> None:
         ("schema = 1\n[settings.sync]\noffset = nan\n", "not a time"),
         ("schema = 1\n[settings.landmarks]\nrate = 0\n", "above 0"),
         ("schema = 1\n[edits.fit]\ncandidate = 'best'\n", "'best' is not what is expected"),
+        ("schema = 1\n[edits.clean]\nswaps = [[3, 3, 10]]\n", "names marker 3 twice"),
+        ("schema = 1\n[edits.clean]\nswaps = [[3, 4, -10]]\n", "frames count up from 0"),
+        ("schema = 1\n[edits.clean]\njoins = [[3, 4, 9, 5]]\n", "from frame 9 to 5"),
+        ("schema = 1\n[edits.clean]\nkeep = [[3, 9, 5]]\n", "from frame 9 to 5"),
         ("schema = 1\n[run]\nmethod = 'magic'\n", "'magic' is not what is expected"),
         ("schema = 1\nrun = 3\n", "[run] is not a table"),
         ("schema = 99\nprogram = 'markerscope 9'\n", "update Markerscope"),
@@ -357,6 +361,21 @@ def test_a_session_that_is_none(shell: Shell, text: bytes | str, says: str) -> N
         )
     shell.file("session.toml", text)
     assert says in shell.refused(shell.folder, names="session.toml", out=False)
+
+
+def test_edits_of_tracks_are_not_moved_to_other_frames_by_another_range(shell: Shell) -> None:
+    shell.file(
+        "session.toml",
+        "schema = 1\n[settings.markers]\nstart = 0.5\n[edits.clean]\nkeep = [[3, 5, 9]]\n"
+        f"[inputs.marker_file]\npath = '{shell.good.markers}'\n[inputs.prior_file]\npath = '{shell.good.prior}'\n",
+    )
+    for words in ([shell.folder, "--range", "1:"], [shell.good.markers, "--prior", shell.good.prior]):
+        request = [str(word) for word in words]
+        code = main(["solve", *request, "--out", str(shell.folder)])
+        said = shell.capsys.readouterr().err
+        assert code == 2 and "counts frames from the start of the range" in said, said
+    kept = SolveRequest(shell.folder, range=(0.5, 3.0))
+    assert session_of(kept).edits == {"clean": {"keep": [[3, 5, 9]]}}
 
 
 @pytest.mark.parametrize("role", ["marker", "video", "prior"])

@@ -219,10 +219,10 @@ def _sentence(command: str) -> str:
 
 
 def _attach_negative_values(words: list[str]) -> list[str]:
-    """``--offset -1e-3`` as ``--offset=-1e-3``: argparse would take such a number for an option."""
+    """``--neutral -2:4`` as ``--neutral=-2:4``, of any option: argparse would take such a value for an option."""
     joined: list[str] = []
     for word in words:
-        if joined and joined[-1] in ("--offset", "--range") and re.match(r"-[\d.:]", word):
+        if joined and re.fullmatch(r"--[^=]+", joined[-1]) and re.match(r"-[\d.:]", word):
             joined[-1] += f"={word}"
         else:
             joined.append(word)

@@ -138,7 +138,8 @@ def cases_of(suite: str, names: tuple[str, ...], frames: int = FRAMES, gaps: Pat
     InputError : there is no such suite or case
     """
     if suite not in SUITES:
-        raise InputError(f'there is no suite "{suite}"', remedy=f"use one of: {', '.join(SUITES)}")
+        known_suites = ", ".join((*SUITES, "clean", "neural"))  # these two declare no cases
+        raise InputError(f'there is no suite "{suite}"', remedy=f"use one of: {known_suites}")
     cases = SUITES[suite](frames, gaps)
     known = {case.name: case for case in cases}
     for name in names:

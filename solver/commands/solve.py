@@ -112,7 +112,22 @@ def session_of(request: SolveRequest) -> Session:
         path = getattr(request, name)
         if path is not None:
             session = _with_input(session, f"{name}_file", camera_file(path) if name == "camera" else path)
-    return _with_options(_with_neutral(session, request), request)
+    session = _with_options(_with_neutral(session, request), request)
+    known = folder or (out and session_folder(out))
+    if known is not None:
+        _require_frames(load_session(known), session)
+    return session
+
+
+def _require_frames(before: Session, after: Session) -> None:
+    """Refuse where edits of tracks, which name frames of the range, would come to mean others."""
+    starts = {session.stage_settings(graph_of(session))["markers"].start for session in (before, after)}
+    if len(starts) > 1 and {"keep", "swaps", "joins"} & set(after.edits.get("clean", {})):
+        raise InputError(
+            "counts frames from the start of the range, which would be another",
+            f"{after.folder / FILE_NAME}, edits.clean",
+            "keep the start of the range (--range), or take these edits out",
+        )
 
 
 def _folder(request: SolveRequest) -> Path:

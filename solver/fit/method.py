@@ -65,10 +65,9 @@ def localize(
     cloud = np.full(seen.markers.shape[1], -1)
     cloud[wanted] = clouds(seen.markers[:, wanted])
     overlay = partial(_laid_over, body, seen, settings=settings, camera=camera)
-    taken = 0
     if cloud.max(initial=0) > 0:
         cloud = one_body(cloud, lambda own: overlay(own)[0][0].cost)
-        taken = taken_cloud(cloud, settings.part_of_cloud, lambda own: overlay(own)[0][0].cost)
+    taken = taken_cloud(cloud, settings.part_of_cloud, lambda own: overlay(own)[0][0].cost)
     used = within_reach(seen.markers, wanted[(cloud[wanted] == taken) | (cloud[wanted] < 0)])
     if len(used) < 3:
         raise InputError(

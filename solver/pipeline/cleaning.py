@@ -42,8 +42,15 @@ class CleaningSettings:
     joins: tuple[tuple[int, int, int, int], ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse what cannot work."""
+        """Refuse what cannot work. Frames past the end are no mistake: the range may have been cut since."""
         self.plain()
+        spans = [*((first, last) for _, first, last in self.keep), *((first, last) for *_, first, last in self.joins)]
+        for name, rows in (("swaps", self.swaps), ("joins", self.joins)):
+            if twice := [row for row in rows if row[0] == row[1]]:
+                raise ValueError(f"{name} names marker {twice[0][0]} twice, where two markers are needed")
+        for first, last in [*spans, *((frame, frame) for *_, frame in self.swaps)]:
+            if not 0 <= first <= last:
+                raise ValueError(f"an edit of tracks goes from frame {first} to {last}: frames count up from 0")
 
     def plain(self) -> CleanSettings:
         """The same for ``clean``."""

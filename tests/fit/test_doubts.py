@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.rotations import exp_so3, mean_rotation
 from markerscope.solver.core.skeleton import INDEX, JOINTS, mirror_index
 from markerscope.solver.fit.doubts.agreement import agreement, disagreement
@@ -197,7 +198,9 @@ def test_the_cloud_nearest_to_the_video_is_taken_unless_another_is_asked_for() -
     assert taken_cloud(cloud, 3, cost) == 2
     limb_of_another = np.array([0] * 40 + [1] * 9)
     assert taken_cloud(limb_of_another, None, lambda columns: costs[int(limb_of_another[columns[0]])]) == 0
-    assert taken_cloud(cloud, 9, cost) == 1, "there is no ninth"
+    for one in (cloud, np.zeros(5, int)):
+        with pytest.raises(InputError, match=f"cloud 9 was asked for, the markers form {one.max() + 1}"):
+            taken_cloud(one, 9, cost)
     assert taken_cloud(np.zeros(5, int), None, cost) == 0
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from markerscope.solver.clustering.affinity import affinity
+from markerscope.solver.core.errors import InputError
 from markerscope.solver.fit.doubts.doubt import Doubt, Evidence, named, plural
 
 NEAR_M, APART_M = 0.38, 0.42
@@ -92,11 +93,21 @@ def taken_cloud(cloud: np.ndarray, asked: int | None, cost: Callable[[np.ndarray
     Parameters
     ----------
     cloud : (M,) as ``clouds`` gives them
-    asked : counted from 1; one that is not there is left unheard
+    asked : counted from 1
     cost : m^2, how far some markers (their columns) stay from the video's body, laid over them as well as it goes
+
+    Raises
+    ------
+    InputError : there is no such cloud
     """
-    sizes = np.bincount(cloud[cloud >= 0])
-    if asked is not None and 1 <= asked <= len(sizes):
+    sizes = np.bincount(cloud[cloud >= 0], minlength=1)
+    if asked is not None:
+        if asked > len(sizes):
+            raise InputError(
+                f"cloud {asked} was asked for, the markers form {len(sizes)}",
+                "part_of_cloud (--part-of-cloud)",
+                "choose one that is there, or leave it out",
+            )
         return asked - 1
     people = np.flatnonzero(sizes >= max(WHOLE, _SHARE * sizes.max(initial=0)))
     if len(people) < 2:
