@@ -13,6 +13,7 @@ from markerscope.solver.io.labels import prefix, subjects_of
 from markerscope.solver.io.markers_in import markers_of, settled
 from markerscope.solver.io.raw import RawMarkers
 from markerscope.solver.io.units import cloud_size, settle_units
+from markerscope.widgets.dialogs.import_data import ImportShown
 
 _AXES: tuple[UpAxis, ...] = ("x", "y", "z")
 _PLACEHOLDER_HZ = 100.0
@@ -20,46 +21,25 @@ _UNITS = {1.0: "m", 0.1: "dm", 0.01: "cm", 0.001: "mm", 1e-6: "µm", 0.0254: "in
 """Names of units by their metres."""
 
 
-@dataclass(frozen=True, eq=False)
-class ImportPreview:
-    """A file as it would be read.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ImportPreview(ImportShown):
+    """A file as it would be read: what the dialog shows, and the markers themselves.
 
     Attributes
     ----------
     markers : metres, z up; with a made-up rate where ``problem`` asks for one
-    subjects : that the file tells apart
-    subject : whose markers these are, "" where the file names none
-    rate, rate_known : Hz, and whether the file or the user said so
-    units, units_declared : taken, and as the file spells it (None where it is silent)
-    up, up_declared : taken, and as the file says
-    measured : (M,) share 0..1 of the frames that show each marker
-    frame : the one with most markers in sight
-    points : (M, 3) m, z up, of that frame; NaN = lost
+    frame : the one with most markers in sight, whose points are shown
     size : m, diagonal of the box around one frame's markers; NaN without any
-    notes : what was assumed, one sentence each
-    problem : what keeps the file from being read so, "" if nothing does
     """
 
     markers: Markers
-    subjects: tuple[str, ...]
-    subject: str
-    rate: float
-    rate_known: bool
-    units: str
-    units_declared: str | None
-    up: UpAxis
-    up_declared: UpAxis | None
-    measured: np.ndarray
     frame: int
-    points: np.ndarray
     size: float
-    notes: tuple[str, ...]
-    problem: str = ""
 
     @property
     def seconds(self) -> float:
         """How long the recording lasts."""
-        return len(self.markers.positions) / self.rate
+        return self.frames / self.markers.rate
 
 
 def preview_of(
@@ -95,10 +75,13 @@ def preview_of(
     frame = int(present.sum(axis=1).argmax())
     size = cloud_size(markers.positions)
     return ImportPreview(
+        name=Path(path).name,
+        labels=markers.labels,
+        frames=len(markers.positions),
         markers=markers,
         subjects=subjects_of(raw.labels, raw.subjects, raw.assets),
         subject=_owner(own, subjects_of(raw.labels, raw.subjects, raw.assets)),
-        rate=markers.rate,
+        rate=0.0 if problem else markers.rate,
         rate_known=not problem,
         units=_unit(settle_units(own.positions, own.units, units, str(path), own.labels)[0]),
         units_declared=raw.units,

@@ -9,11 +9,11 @@ from typing import Any, cast
 from PySide6.QtWidgets import QDialog, QWidget
 
 from markerscope.app.models.imports import new_session
-from markerscope.app.views.preview import ImportPreview, preview_of
+from markerscope.app.views.preview import preview_of
 from markerscope.app.window.videos import videos_beside
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.markers import UpAxis
-from markerscope.widgets.dialogs.import_data import ImportChoice, ImportShown
+from markerscope.widgets.dialogs.import_data import ImportChoice
 from markerscope.widgets.dialogs.import_dialog import ImportDialog
 
 
@@ -30,7 +30,7 @@ class Importing:
         self.subject: str | None = None
         self.rate: float | None = None
         self.preview = preview_of(self.raw, path)
-        dialog.set_shown(_shown(path, self.preview))
+        dialog.set_shown(self.preview)
         dialog.changed.connect(self._changed)
 
     def _changed(self, choice: ImportChoice) -> None:
@@ -53,7 +53,7 @@ class Importing:
             from dataclasses import replace
 
             self.preview = replace(self.preview, problem=str(error))
-        self.dialog.set_shown(_shown(self.path, self.preview))
+        self.dialog.set_shown(self.preview)
 
     def session(self) -> Mapping[str, Any]:
         """Arguments of ``Document.new``."""
@@ -92,23 +92,3 @@ def ask_how_to_import(
     found = importing.session() if agreed else None
     dialog.deleteLater()
     return found
-
-
-def _shown(path: Path, preview: ImportPreview) -> ImportShown:
-    return ImportShown(
-        name=path.name,
-        labels=preview.markers.labels,
-        measured=preview.measured,
-        points=preview.points,
-        frames=len(preview.markers.positions),
-        units=preview.units,
-        units_declared=preview.units_declared,
-        up=preview.up,
-        up_declared=preview.up_declared,
-        rate=preview.rate if preview.rate_known else 0.0,
-        rate_known=preview.rate_known,
-        subjects=preview.subjects,
-        subject=preview.subject,
-        notes=preview.notes,
-        problem=preview.problem,
-    )

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QPalette
@@ -185,9 +188,9 @@ class ImportDialog(QDialog):
                     item.setCheckState(0, Qt.CheckState.Checked if measured >= least else Qt.CheckState.Unchecked)
         self._changed()
 
-    def _set(self, name: str, value: object) -> None:
+    def _set(self, name: str, value: Any) -> None:
         if self._shown is not None:
-            self._shown = ImportShown(**{**vars(self._shown), name: value})
+            self._shown = replace(self._shown, **{name: value})
             self._changed()
 
     def _changed(self, *_: object) -> None:
