@@ -28,6 +28,7 @@ from markerscope.solver.io import load_markers
 from markerscope.solver.io.export_c3d import write_c3d
 from markerscope.solver.io.export_csv import write_markers_csv
 from markerscope.solver.io.export_trc import write_trc
+from markerscope.solver.pipeline.digest import file_digest
 from markerscope.solver.pipeline.session import save_session
 from tests.fit.conftest import simulate
 from tests.synthetic import Recording, know, record, watched
@@ -378,6 +379,22 @@ def test_edits_of_tracks_are_not_moved_to_other_frames_by_another_range(shell: S
     assert session_of(kept).edits == {"clean": {"keep": [[3, 5, 9]]}}
 
 
+def test_edits_by_number_are_not_carried_to_other_markers(shell: Shell) -> None:
+    mine = whole(shell, ".trc")
+    digest = file_digest(mine)
+    text = (
+        "schema = 1\n[edits.segment]\nleft_out = [0]\n"
+        f"[inputs.prior_file]\npath = '{shell.good.prior}'\n[inputs.marker_file]\npath = '{mine}'\n"
+    )
+    shell.file("session.toml", f"{text}sha256 = '{digest}'\n")
+    assert session_of(SolveRequest(shell.folder)).edits
+    whole(shell, ".trc", lambda markers: replace(markers, labels=markers.labels[::-1]))
+    said = shell.refused(shell.folder, names=mine, out=False)
+    assert "edits.segment" in said and "names its markers by number" in said
+    shell.file("session.toml", text)
+    assert session_of(SolveRequest(shell.folder)).edits, "somebody has looked and says so"
+
+
 @pytest.mark.parametrize("role", ["marker", "video", "prior"])
 def test_a_session_whose_input_is_gone(shell: Shell, role: str) -> None:
     inputs = {"marker": shell.good.markers, "prior": shell.good.prior} | {role: shell.folder / "gone"}
@@ -449,3 +466,9 @@ def test_as_a_program_of_its_own(shell: Shell) -> None:
         done.stderr.splitlines()[-1]
         == f"{path}: is not a C3D file; export it again or give the file its right extension."
     )
+
+
+def test_weights_for_a_method_that_reads_none(shell: Shell) -> None:
+    good = shell.good
+    said = shell.refused(good.markers, "--prior", good.prior, "--weights", shell.file("w.safetensors"))
+    assert "weights are for --method neural alone" in said

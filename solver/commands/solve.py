@@ -115,7 +115,9 @@ def session_of(request: SolveRequest) -> Session:
     session = _with_options(_with_neutral(session, request), request)
     known = folder or (out and session_folder(out))
     if known is not None:
-        _require_frames(load_session(known), session)
+        before = load_session(known)
+        _require_frames(before, session)
+        _require_markers(before, session)
     return session
 
 
@@ -127,6 +129,20 @@ def _require_frames(before: Session, after: Session) -> None:
             "counts frames from the start of the range, which would be another",
             f"{after.folder / FILE_NAME}, edits.clean",
             "keep the start of the range (--range), or take these edits out",
+        )
+
+
+def _require_markers(before: Session, after: Session) -> None:
+    """Refuse where edits, which name markers by number, would come to mean others: the file holds something else."""
+    known, now = before.inputs.get("marker_file"), after.inputs["marker_file"]
+    numbered = [name for name in ("clean", "segment", "localize") if after.edits.get(name)]
+    if known is None or not known.digest or known.path != now.path or not numbered or not now.path.exists():
+        return
+    if after.digests.digest(now.path) != known.digest:
+        raise InputError(
+            f"has changed since, and edits.{numbered[0]} of {after.folder / FILE_NAME} names its markers by number",
+            now.path,
+            "take these edits out, or, if the markers are the same ones in the same order, the marker file's sha256",
         )
 
 
@@ -173,6 +189,8 @@ def _with_neutral(session: Session, request: SolveRequest) -> Session:
 def _with_options(session: Session, request: SolveRequest) -> Session:
     """The request's options over the session's settings, and over its edits: what is said last counts."""
     session = with_method(session, request.method or session.run.method)
+    if request.weights is not None and session.run.method != "neural":
+        raise InputError("weights are for --method neural alone", "--weights", "add --method neural, or leave it out")
     settings, edits = dict(session.settings), dict(session.edits)
     options = {**_said(request), **_capped(request, session.run.method), **_drawn(request, session.run.method)}
     for stage, said in options.items():

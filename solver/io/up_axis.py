@@ -25,16 +25,17 @@ def settle_up(metres: np.ndarray, raw: RawMarkers, wanted: UpAxis | None) -> tup
     raw : what the file declares
     wanted : axis the user names, if any; wins
     """
-    if wanted is not None:
-        told = f"The file says {raw.up} is up; {wanted} was taken as asked."
-        return lab_rotation(wanted), (told,) if raw.up not in (None, wanted) else ()
     scores = vertical_scores(metres)
-    if raw.up is not None:
-        if scores is None or scores.max() - scores[_AXES.index(raw.up)] < _DECLARED_WRONG:
-            return lab_rotation(raw.up), ()
-        other = _AXES[int(scores.argmax())]
-        told = f"The file says {raw.up} is up, but the markers look as if {other} were; check it."
-        return lab_rotation(raw.up), (told,)
+    said = wanted or raw.up
+    if said is not None:
+        notes = []
+        if wanted is not None and raw.up not in (None, wanted):
+            notes.append(f"The file says {raw.up} is up; {wanted} was taken as asked.")
+        if scores is not None and scores.max() - scores[_AXES.index(said)] >= _DECLARED_WRONG:
+            other = _AXES[int(scores.argmax())]
+            by = "You say" if wanted is not None else "The file says"
+            notes.append(f"{by} {said} is up, but the markers look as if {other} were; check it.")
+        return lab_rotation(said), tuple(notes)
     if scores is None:
         up = raw.usual_up or "z"
         return lab_rotation(up), (f"The file does not say which axis is up; {up} was taken by custom.",)

@@ -74,6 +74,7 @@ def test_guessed_axis_of_a_real_file_is_said_and_can_be_overridden(shared_data: 
     np.testing.assert_allclose(forced.positions, guessed.positions @ guessed.R_lab_internal.T)
     told = load_markers(shared_data / "fullbody/cmu_02_05.c3d", up="y")
     assert any("says z is up; y was taken as asked" in note for note in told.notes)
+    assert any("You say y is up, but the markers look as if z were" in note for note in told.notes)
 
 
 @pytest.mark.parametrize("part", [("L_knee", "L_ankle", "L_toe", "L_calc", "L_thigh1", "L_thigh2", "L_shank_antsup")])

@@ -152,8 +152,8 @@ def several(seen: Evidence) -> Doubt | None:
     what = "two or more people, it seems" if people > 1 else "a second person's markers or those of a thing, it seems"
     return Doubt(
         "several clouds",
-        f"The markers form {len(sizes)} clouds that keep apart ({counts}): {what}. Cloud {seen.taken + 1} was solved, "
-        f"{'which moves most like the video; ' if people > 1 else ''}"
+        f"The markers form {len(sizes)} clouds that keep apart ({counts}): {what}. Cloud {seen.taken + 1} was solved"
+        f"{' (the one that moves most like the video, or that you chose)' if people > 1 else ''}, "
         f"the other {plural(len(others), 'marker')} were left out ({named(seen.labels, others)}). "
         "To solve another, choose it as part_of_cloud (--part-of-cloud).",
         tuple(int(m) for m in others),
