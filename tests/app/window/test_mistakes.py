@@ -10,9 +10,11 @@ from PySide6.QtCore import QTimer
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
+from markerscope.app.models.workbench import Said
 from markerscope.app.window.main import MainWindow
 from markerscope.app.window.mistakes import Mistakes
 from markerscope.solver.core.errors import InputError
+from markerscope.solver.pipeline.session import Session
 from markerscope.widgets import guard
 from tests.widgets.drawn import pixels
 
@@ -74,3 +76,19 @@ def test_a_widget_that_fails_to_paint_says_so_and_leaves_no_painter(spin: Callab
     assert not any(painter.isActive() for painter in kept)
     widget.close()
     widget.deleteLater()
+
+
+def test_a_message_goes_with_the_session_it_is_about(
+    open_window: Callable[[], MainWindow], session: Session, spin: Callable[..., None]
+) -> None:
+    window = open_window()
+    bench = window.bench
+    window.open_path(session.folder)
+    spin(lambda: bench.clock.timing.frames > 0, "the markers")
+    bench.say(Said("error", "the person moves", "the neutral pose", "choose another span"))
+    assert [message.what for message in window.messages.messages()] == ["the person moves"]
+    bench.close()
+    spin()
+    assert window.messages.messages() == [], "nothing of it is said over the next session"
+    window.open_path(session.folder / "absent.c3d")
+    assert [message.level for message in window.messages.messages()] == ["error"], "what fails now is still said"
