@@ -124,6 +124,7 @@ def measure_surface(given: Mapping[str, Any], settings: NoSettings, progress: Pr
 def check_result(given: Mapping[str, Any], settings: NoSettings, progress: Progress) -> Verdict:
     """What speaks against the result, by every rule there is."""
     from markerscope.solver.fit.doubts.doubt import Evidence
+    from markerscope.solver.fit.doubts.rigid import greatest_distance
     from markerscope.solver.fit.doubts.rules import verdict
     from markerscope.solver.fit.observe import on_clock
     from markerscope.solver.sync.offset import lead
@@ -151,5 +152,6 @@ def check_result(given: Mapping[str, Any], settings: NoSettings, progress: Progr
         taken=getattr(found, "taken", 0),
         far=ranked.far,
         mirror=ranked.mirror,
+        span=greatest_distance(motion.placed[len(motion.time) // 2]),
     )
     return verdict(evidence, motion.confidence)
