@@ -70,6 +70,21 @@ def test_a_subject_that_stands_still_is_never_sure_however_large_the_margin() ->
     assert judged(1.0, swing_deg=2.0).confidence <= 0.5 + 0.02, "the cap raises nothing"
 
 
+def test_a_whole_body_that_stands_still_is_told_by_its_shape_where_the_answer_is_clear() -> None:
+    whole = [*range(22)]
+    clear, near = (judge((candidate(10.0, whole, 2.0), candidate(energy, whole[::-1], 2.0))) for energy in (15.0, 12.0))
+    assert clear.confidence > 0.95 and clear.warnings == ()
+    assert near.confidence == 0.6 and "hardly moves" in near.warnings[0]
+    apart = judge((candidate(10.0, whole[1:10], 2.0), candidate(15.0, whole[10:19], 2.0)))
+    assert apart.confidence == 0.6, "two legs and the lower back are no whole body"
+
+
+def test_a_whole_body_is_no_limb_even_where_no_marker_sits_on_the_pelvis() -> None:
+    names = "right_hip right_knee left_knee left_ankle spine2 spine3 left_shoulder right_shoulder left_elbow head neck"
+    bones = [INDEX[name] for name in names.split()]
+    assert judge((candidate(10.0, bones, 90.0), candidate(15.0, bones[::-1], 90.0))).confidence > 0.95
+
+
 def test_the_nearest_different_answer_is_the_rival() -> None:
     best, alike, rival, coarse = (candidate(energy, bones, 90.0) for energy, bones in
                                   ((10.0, LEG), (10.1, LEG), (15.0, ARM), (10.2, ARM)))  # fmt: skip
