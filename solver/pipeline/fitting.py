@@ -176,6 +176,7 @@ def check_result(
 ) -> Verdict:
     """What speaks against the result, by every rule there is."""
     from markerscope.solver.fit.doubts.doubt import Evidence
+    from markerscope.solver.fit.doubts.rigid import greatest_distance
     from markerscope.solver.fit.doubts.rules import verdict
     from markerscope.solver.fit.observe import on_clock
     from markerscope.solver.sync.offset import lead
@@ -203,5 +204,6 @@ def check_result(
         taken=taken,
         far=orient.far,
         mirror=orient.mirror,
+        span=greatest_distance(fit.placed[len(fit.time) // 2]),
     )
     return verdict(evidence, fit.confidence)

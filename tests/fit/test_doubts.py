@@ -19,7 +19,7 @@ from markerscope.solver.fit.doubts.limb import lone_limb
 from markerscope.solver.fit.doubts.mirror import both_sides, in_mirror, mirrored, video_in_doubt
 from markerscope.solver.fit.doubts.misfit import off_the_skin, off_their_places
 from markerscope.solver.fit.doubts.picture import off_the_picture
-from markerscope.solver.fit.doubts.rigid import one_group
+from markerscope.solver.fit.doubts.rigid import greatest_distance, one_group
 from markerscope.solver.fit.doubts.rules import RULES, verdict
 from markerscope.solver.fit.doubts.still import still, still_markers
 from markerscope.solver.fit.doubts.turn import camera_turn, turning_camera
@@ -264,6 +264,18 @@ def test_left_out_markers_do_not_hide_that_the_rest_is_one_piece() -> None:
     assert one_group(sound(affinity=affinity)) is None
 
 
+def test_a_limb_held_still_is_longer_than_any_bone() -> None:
+    stiff = np.full((6, 6), 0.002)
+    assert one_group(sound(affinity=stiff, span=0.49)) is not None
+    assert one_group(sound(affinity=stiff, span=0.55)) is None
+    assert one_group(sound(affinity=stiff, span=0.55, joint=np.full(6, 1))) is not None, "all on one bone all the same"
+
+
+def test_the_greatest_distance_is_between_points_that_are_there() -> None:
+    assert greatest_distance(np.array([[0, 0, 0], [0.3, 0.4, 0], [9, 9, np.nan]])) == pytest.approx(0.5)
+    assert np.isnan(greatest_distance(np.full((2, 3), np.nan)))
+
+
 # video --------------------------------------------------------------------------------------------------------------
 
 
@@ -319,6 +331,10 @@ def test_a_limb_that_does_not_hold_the_pelvis_says_nothing_of_the_camera() -> No
     pan = exp_so3(np.linspace(0, 1.2, T)[:, None, None] * np.array([0, 1.0, 0])) @ moving()
     assert turning_camera(sound(video=pan, joint=np.array([1, 2, 4, 5, 7, 8]))) is not None, "two legs do"
     assert turning_camera(sound(video=pan, joint=np.array([1, 4, 7, 10, 1, 4]))) is None
+    assert turning_camera(sound(video=pan, joint=np.array([1, 4, 7, 10, 1, 0]))) is None, (
+        "nor one marker on the hip bone"
+    )
+    assert turning_camera(sound(video=pan, joint=np.array([1, 4, 7, 0, 3, 0]))) is not None, "three hold it"
     assert turning_camera(sound(video=pan, joint=np.array([16, 17, 18, 19, 20, 21]))) is None
 
 

@@ -55,6 +55,7 @@ class Evidence:
     taken : number of the cloud that was solved
     far : columns of markers that fit no place on the body
     mirror : times the energy that the answer costs of what it does with the video mirrored; NaN where not tried
+    span : m, greatest distance between two markers in use; NaN where unknown
     said : what the ranking of the answers itself has to say
     """
 
@@ -76,6 +77,7 @@ class Evidence:
     taken: int
     far: np.ndarray
     mirror: float = float("nan")
+    span: float = float("nan")
     said: tuple[str, ...] = ()
 
 

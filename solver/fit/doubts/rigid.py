@@ -8,6 +8,16 @@ from markerscope.solver.fit.doubts.doubt import Doubt, Evidence
 
 RIGID_M = 0.008
 """Distances on one bone vary by less than this, skin and all."""
+LONGEST_BONE_M = 0.5
+"""A thigh of a tall person. What moves as one piece and is longer, a limb held still, no single bone can carry."""
+
+
+def greatest_distance(points: np.ndarray) -> float:
+    """m, between any two of some points (M, 3) m, NaN = not there; NaN where none is."""
+    there = points[np.isfinite(points).all(axis=1)]
+    if not len(there):
+        return float("nan")
+    return float(np.linalg.norm(there[:, None] - there[None], axis=2).max())
 
 
 def one_group(seen: Evidence) -> Doubt | None:
@@ -18,7 +28,7 @@ def one_group(seen: Evidence) -> Doubt | None:
     with np.errstate(invalid="ignore"):
         most = float(np.nanmax(seen.affinity[np.ix_(used, used)], initial=0.0))
     alone = len(set(seen.joint[used].tolist())) == 1
-    if most >= RIGID_M and not alone:
+    if not alone and (most >= RIGID_M or seen.span > LONGEST_BONE_M):
         return None
     if most >= RIGID_M:
         return Doubt(

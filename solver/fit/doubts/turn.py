@@ -11,6 +11,7 @@ from markerscope.solver.fit.doubts.doubt import Doubt, Evidence
 SPREAD_DEG = 26.0
 DRIFT_DEG = 28.0
 _ROUNDS = 8
+_LOWER_TRUNK, _HOLD_A_TURN = ("pelvis", "spine1"), 3
 
 
 def camera_turn(rotations: np.ndarray, video: np.ndarray, tracked: np.ndarray) -> tuple[float, float]:
@@ -51,12 +52,13 @@ def _without_bias(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
 
 
 def holds_pelvis(joint: np.ndarray) -> bool:
-    """Whether markers (M,), by their bones, hold the pelvis: on itself, the lower back, or both thighs.
+    """Whether markers (M,), by their bones, hold the pelvis: three on itself and the lower back, or both thighs.
 
-    Of a lone limb, or of two arms, the pelvis is where the video has it, and says nothing of the camera.
+    Of a lone limb, or of two arms, the pelvis is where the video has it, and says nothing of the camera. One marker of
+    a leg that came to lie on the hip bone does not change that: it takes three to hold a bone's turn.
     """
-    marked = {JOINTS[j] for j in joint if j >= 0}
-    return bool(marked & {"pelvis", "spine1"}) or {"left_hip", "right_hip"} <= marked
+    marked = [JOINTS[j] for j in joint if j >= 0]
+    return sum(name in _LOWER_TRUNK for name in marked) >= _HOLD_A_TURN or {"left_hip", "right_hip"} <= set(marked)
 
 
 def turning_camera(seen: Evidence) -> Doubt | None:
