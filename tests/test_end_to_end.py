@@ -27,6 +27,7 @@ from tests.synthetic import Recording, record, session, watched
 ALWAYS = {
     "angles.csv", "angles.json", "angles.mot", "motion.npz", "motion.bvh", "markers_labelled.c3d",
     "markers_labelled.trc", "markers_labelled.filled.csv", "report.html", "session.toml", "results",
+    "in_force.json",
 }  # fmt: skip
 
 

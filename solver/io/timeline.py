@@ -257,10 +257,16 @@ def _uneven(time: np.ndarray, declared: float | None) -> Timeline:
     return _gridded(steps, settled, _start(time, index, settled), notes)
 
 
+_FIRST_ROWS = 15
+
+
 def _tracked(time: np.ndarray, rate: float) -> np.ndarray:
     """(rows - 1,) steps of a clock that follows the stamps slowly: one row's jitter is no step, a lasting shift is."""
     steps = np.ones(len(time) - 1)
-    at, step = float(time[0]), 1 / rate
+    step = 1 / rate
+    # The first stamp jitters too: the clock is set by where the first rows lie within their steps on average.
+    phase = np.angle(np.exp(2j * np.pi * (time[:_FIRST_ROWS] - time[0]) / step).mean()) / (2 * np.pi)
+    at = float(time[0] + phase * step)
     for i, stamp in enumerate(time[1:].tolist()):
         count = max(1, round((stamp - at) / step))
         error = stamp - at - count * step

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from markerscope.solver.io.timeline import even_grid
@@ -167,6 +167,7 @@ def test_a_time_column_that_cannot_be_used_is_said(numbered: bool) -> None:
 
 
 @given(rate=rates, seed=st.integers(0, 1000), lost=st.integers(2, 9), at=st.integers(40, 160))
+@example(rate=50.0, seed=150, lost=2, at=40)
 def test_rows_missing_among_jittered_ones_are_told_by_a_shift_that_stays(
     rate: float, seed: int, lost: int, at: int
 ) -> None:

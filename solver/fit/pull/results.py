@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-EARNED = float(np.log(100))
+EARNED = float(np.log(1000))
 """Logarithm of the likelihood ratio above which a layout is drawn to landmarks."""
 State = Literal["earned", "by hand", "not earned", "given up", "off"]
 """Drawn because the layout earned it, or only where it was pinned; else not: for want of likelihood, because markers

@@ -223,7 +223,7 @@ def test_all_that_a_view_draws_is_in_its_list() -> None:
     """The lists name no stage that is not drawn, and every stage that is drawn."""
     from markerscope.app.window.shown import WANTED
 
-    assert set(WANTED) - {"check"} == STAGES, "a doubt that is out of date is told nowhere"
+    assert set(WANTED) == STAGES
 
 
 def test_every_layer_can_be_hidden_while_the_clock_moves(window: MainWindow, spin: Spin) -> None:
