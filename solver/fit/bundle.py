@@ -32,7 +32,7 @@ _ENOUGH = 1e-3
 
 _SHOWN = 12
 """Hypotheses that were left behind and are kept to be looked at."""
-_SETTLED = 0.95
+_SETTLED, _MOST_ROUNDS = 0.95, 4
 """Further rounds of choosing places end when one leaves more than this share of the energy."""
 
 
@@ -373,10 +373,21 @@ def _with_rival(problem: Problem, coarse: Fit, best: Fit, left: list[Fit], base:
     return left
 
 
-def settled_again(problem: Problem, fit: Fit, base: Weights) -> Fit:
-    """A refined fit whose markers choose their places anew, descended to its end once more."""
+def settled_again(problem: Problem, fits: Sequence[Fit], base: Weights) -> tuple[Fit, ...]:
+    """The same fits; those that are refined choose their places anew until that gains nothing, and are ranked again."""
     judge = _judging(phase_weights(base, FINE[-1]), problem)
-    return _advance(problem, fit, phases=FINE, base=base, judge=judge)
+    fine = spread(partial(_to_its_end, problem, base=base, judge=judge), [fit for fit in fits if fit.refined])
+    fine.sort(key=lambda fit: fit.energies.total)
+    return *fine, *(fit for fit in fits if not fit.refined)
+
+
+def _to_its_end(problem: Problem, fit: Fit, *, base: Weights, judge: Weights) -> Fit:
+    for _ in range(_MOST_ROUNDS):
+        before = fit.energies.total
+        fit = _advance(problem, fit, phases=FINE, base=base, judge=judge)
+        if fit.energies.total > _SETTLED * before:
+            break
+    return fit
 
 
 def _tell(progress: Progress, guesses: Sequence[Hypothesis], fits: Sequence[Fit]) -> None:

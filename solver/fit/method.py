@@ -184,13 +184,14 @@ def orient(
     fits = search(used)
     far = np.zeros(len(found.markers), dtype=bool)
     for _ in range(_SIFTINGS if settings.leave_out_far else 0):
-        whole = Problem(body, used.at(found.many), landmarks)
-        stray = strays(body, fits[0], used.at(found.many).markers)
-        if not stray.any():
+        shown = used.at(found.many)
+        if not strays(body, fits[0], shown.markers).any():
             break
-        nowhere = stray & without_place(whole, fits[0], weights.offset)
+        # A fit that was not at its end yet leaves markers of the person behind: only the end tells whose they are.
+        fits = settled_again(Problem(body, shown, landmarks), fits, weights)
+        stray = strays(body, fits[0], shown.markers)
+        nowhere = stray & without_place(Problem(body, shown, landmarks), fits[0], weights.offset)
         if not nowhere.any() or (far | nowhere).sum() > len(far) - _FEWEST:
-            fits = (settled_again(whole, fits[0], weights), *fits[1:])
             break
         far |= nowhere
         used = replace(used, markers=np.where(far[:, None], np.nan, used.markers))
