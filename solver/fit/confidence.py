@@ -15,14 +15,14 @@ _STILL_DEG = 12.0
 _PER_JUDGED, _MOST_JUDGED = 6, 2
 _TIE = 1.15
 _WHOLE_BONES, _CLEAR = 10, 1.3
-"""Markers on more bones than this lie on a person as on no other part: a clear answer needs no movement then. Of 11 whole
-bodies that hardly moved all were right, their margins 1.05 to 2.6; of ten parts one was wrong, with 1.65.
+"""Markers on more bones than this lie on a person as on no other part: a clear answer needs no movement then. Of eleven
+whole bodies that hardly moved all were right, their margins 1.05 to 2.6; of ten parts one was wrong, with 1.65.
 """
 _STEEPNESS = 8.5
 """Told from 400 synthetic sessions of ``markerscope bench``: with it, which were right was likeliest."""
 _STEEPNESS_OF_LIMBS = 4.0
 """Where nothing holds the pelvis, so that side and heading rest on the video alone. Likeliest is 3.75, between 2.25 and
-5.75 with 95 %: of 68 synthetic sessions with markers on limbs alone (``benchmarks/traps.py``) 13 were wrong, some at 1.7.
+5.75 with 95 %: of 68 synthetic sessions with markers on limbs alone (``benchmarks/traps.py``) 13 were wrong, up to 1.9.
 """
 _UNRIVALLED = 0.95
 """Where no other answer was found, or all that were followed ran into the best, nothing says how far the next is. All
