@@ -22,7 +22,7 @@ _STEEPNESS = 8.5
 """Told from 400 synthetic sessions of ``markerscope bench``: with it, which were right was likeliest."""
 _STEEPNESS_OF_LIMBS = 4.0
 """Where nothing holds the pelvis, so side and heading rest on the video alone. Likeliest is 3.75 (95 %: 2.25 to 5.75):
-of 68 synthetic sessions with markers on limbs alone (``benchmarks/traps.py``) 13 were wrong, some at 1.7.
+of 68 synthetic sessions with markers on limbs alone (``benchmarks/traps.py``) 13 were wrong, up to 1.9.
 """
 _UNRIVALLED = 0.95
 """Where no other answer was found, or all that were followed ran into the best, nothing says how far the next is. All

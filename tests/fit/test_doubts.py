@@ -331,9 +331,7 @@ def test_a_limb_that_does_not_hold_the_pelvis_says_nothing_of_the_camera() -> No
     pan = exp_so3(np.linspace(0, 1.2, T)[:, None, None] * np.array([0, 1.0, 0])) @ moving()
     assert turning_camera(sound(video=pan, joint=np.array([1, 2, 4, 5, 7, 8]))) is not None, "two legs do"
     assert turning_camera(sound(video=pan, joint=np.array([1, 4, 7, 10, 1, 4]))) is None
-    assert turning_camera(sound(video=pan, joint=np.array([1, 4, 7, 10, 1, 0]))) is None, (
-        "nor one marker on the hip bone"
-    )
+    assert turning_camera(sound(video=pan, joint=np.array([1, 4, 7, 10, 1, 0]))) is None, "nor one on the hip bone"
     assert turning_camera(sound(video=pan, joint=np.array([1, 4, 7, 0, 3, 0]))) is not None, "three hold it"
     assert turning_camera(sound(video=pan, joint=np.array([16, 17, 18, 19, 20, 21]))) is None
 

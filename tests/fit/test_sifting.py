@@ -9,6 +9,10 @@ import pytest
 
 from markerscope.solver.body.model import Body
 from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.skeleton import INDEX
+from markerscope.solver.fit import method
+from markerscope.solver.fit.bundle import Fit
 from markerscope.solver.fit.doubts.clouds import clouds
 from markerscope.solver.fit.doubts.mirror import in_mirror
 from markerscope.solver.fit.method import fit, in_use, localize, orient
@@ -71,6 +75,26 @@ def test_markers_near_the_body_that_fit_no_place_are_nobody_s(scene: Scene) -> N
     assert np.isnan(motion.placed[:, 36:]).all()
     error = 1000 * np.linalg.norm(motion.joints - scene.joints, axis=2)[:, :22].mean()
     assert error < 25, f"joints are {error:.1f} mm off (synthetic, 36 of 40 markers are the person's)"
+
+
+def test_a_fit_that_has_not_settled_leaves_no_marker_of_the_person_out(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = method.relax
+
+    def unsettled(*given: object, **how: object) -> tuple[Fit, ...]:
+        best, *others = whole(*given, **how)  # type: ignore[arg-type]
+        rotations = best.state.pose.rotations.copy()
+        rotations[:, INDEX["left_shoulder"]] @= exp_so3(np.array([0, 0, 1.2]))
+        return replace(best, state=replace(best.state, pose=replace(best.state.pose, rotations=rotations))), *others
+
+    monkeypatch.setattr(method, "relax", unsettled)
+    found = localize(scene.body, scene.seen, np.zeros(36, bool), QUICK)
+    ranked = orient(scene.body, scene.seen, scene.landmarks, found, WIDE)
+    assert not len(ranked.far), "an arm that was raised out of its markers comes back to them"
+    refined = [one.energy for one in ranked.candidates if one.refined]
+    assert refined == sorted(refined) and all(one.refined for one in ranked.candidates[: len(refined)])
+    assert (scene.bones[found.markers] == ranked.candidates[0].bone).mean() > 0.8
 
 
 def test_without_that_wish_every_marker_stays(scene: Scene) -> None:
