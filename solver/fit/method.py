@@ -12,7 +12,6 @@ from markerscope.solver.core.camera import CameraResult
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.progress import Progress, silent
 from markerscope.solver.core.rotations import log_so3
-from markerscope.solver.core.skeleton import JOINTS, PARTS
 from markerscope.solver.fit.bundle import FINE, Fit, descend, relax, settled_again
 from markerscope.solver.fit.converge import Settled
 from markerscope.solver.fit.counting import candidate_number
@@ -22,6 +21,7 @@ from markerscope.solver.fit.doubts.still import still_markers
 from markerscope.solver.fit.ending import motion_from
 from markerscope.solver.fit.kinematics import Points, Pose, forward, place_points
 from markerscope.solver.fit.localize import Hypothesis, Search, hypotheses
+from markerscope.solver.fit.parts import part_name
 from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.problem import Problem
 from markerscope.solver.fit.refine import every_frame
@@ -407,20 +407,3 @@ def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem, steps: 
         steps=steps,
         behind=fitted.behind,
     )
-
-
-_MOST, _FAR = 0.6, 1 / 3
-"""The share of the markers that names a part, and the share beyond a limb's first bone that makes it that limb."""
-
-
-def part_name(bone: np.ndarray) -> str:
-    """The part of the body that carries most of the markers, in words."""
-    carried = {JOINTS[b] for b in bone}
-    if len(carried) > 8 or ({"left", "right"} <= {name.split("_")[0] for name in carried} and len(carried) > 4):
-        return "whole body" if len(carried) > 10 else "several parts"
-    shares = {part: np.mean([JOINTS[b] in names for b in bone]) for part, names in PARTS.items()}
-    # An arm with a marker on the acromion is an arm as long as its forearm carries its share.
-    far = {part: np.mean([JOINTS[b] in names[1:] for b in bone]) for part, names in PARTS.items()}
-    limbs = [part for part in PARTS if not part.endswith("shoulder") and shares[part] >= _MOST and far[part] >= _FAR]
-    best = max(limbs or PARTS, key=lambda part: shares[part])
-    return best.replace("_", " ") if shares[best] >= _MOST else ", ".join(sorted(carried)).replace("_", " ")
