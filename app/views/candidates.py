@@ -14,6 +14,7 @@ from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.skeleton import subtrees
 from markerscope.solver.fit.confidence import same_answer
 from markerscope.solver.fit.counting import candidate_number
+from markerscope.solver.fit.parts import part_name
 from markerscope.solver.fit.published.results import PaperLocalization
 from markerscope.solver.fit.results import Localization, Orientation
 from markerscope.widgets.tables.candidate_data import CandidateRecord, SearchStep
@@ -136,8 +137,6 @@ def bone_names(bones: Sequence[int] | np.ndarray) -> tuple[str, ...]:
 
 def part_of_bones(bones: np.ndarray) -> str:
     """The part of the body that they make up, in words."""
-    from markerscope.solver.fit.method import part_name  # brings the solver and half of scipy with it
-
     return part_name(bones)
 
 

@@ -15,8 +15,9 @@ _STILL_DEG = 12.0
 _PER_JUDGED, _MOST_JUDGED = 6, 2
 _TIE = 1.15
 _WHOLE_BONES, _CLEAR = 10, 1.3
-"""Markers on more bones than this lie on a person as on no other part: a clear answer needs no movement. Of 11 whole
-bodies that hardly moved all were right, their margins 1.05 to 2.6; of ten parts one was wrong, with 1.65.
+"""Markers on more bones than this lie on a person as on no other part: a clear answer needs no movement then, if it is
+clear beside that of the mirrored video as well. Of eleven whole bodies that hardly moved all were right, their margins
+1.05 to 2.6; of ten parts one was wrong, with 1.65.
 """
 _STEEPNESS = 8.5
 """Told from 400 synthetic sessions of ``markerscope bench``: with it, which were right was likeliest."""
@@ -29,12 +30,15 @@ _UNRIVALLED = 0.95
 of 51 synthetic sessions of that kind (``benchmarks/traps.py``) were right."""
 
 
-def judge(candidates: tuple[Candidate, ...], used: np.ndarray | None = None) -> Orientation:
+def judge(
+    candidates: tuple[Candidate, ...], used: np.ndarray | None = None, mirror: float = float("nan")
+) -> Orientation:
     """Rank is given; find the best different answer, and say what is ambiguous.
 
     Parameters
     ----------
     used : (U,) False for markers that count for nothing; None uses all
+    mirror : times the energy that the best costs of what it does with the video mirrored; NaN where not tried
     """
     best = candidates[0]
     rivals = [i for i, c in enumerate(candidates) if c.refined and i and not same_answer(best, c)]
@@ -42,19 +46,19 @@ def judge(candidates: tuple[Candidate, ...], used: np.ndarray | None = None) -> 
     runner_up = rivals[0] if rivals else -1
     margin = _times(best, candidates[runner_up]) if rivals else float("inf")
     bone = best.bone if used is None else best.bone[used]
-    told_by_shape = _is_whole(bone) and margin >= _CLEAR
+    told_by_shape = is_whole(bone) and margin >= _CLEAR and mirror * _CLEAR <= 1
     still = () if told_by_shape else stillness(best.rotations, bone)
     warnings = list(still)
     if rivals and margin < _TIE:
         warnings.append(_tie(best, candidates[runner_up], margin))
-    steepness = _STEEPNESS if holds_pelvis(bone) or _is_whole(bone) else _STEEPNESS_OF_LIMBS
+    steepness = _STEEPNESS if holds_pelvis(bone) or is_whole(bone) else _STEEPNESS_OF_LIMBS
     confidence = _sure(margin, steepness) if rivals else _UNRIVALLED
     if still:
         confidence = min(confidence, 0.6)
-    return Orientation(candidates, float(margin), runner_up, confidence, tuple(warnings))
+    return Orientation(candidates, float(margin), runner_up, confidence, tuple(warnings), mirror=mirror)
 
 
-def _is_whole(bone: np.ndarray) -> bool:
+def is_whole(bone: np.ndarray) -> bool:
     """Whether markers (U,), by their bones, cover a body and not only a part of it."""
     return len(set(bone[bone >= 0].tolist())) > _WHOLE_BONES
 

@@ -12,7 +12,6 @@ from markerscope.solver.core.camera import CameraResult
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.progress import Progress, silent
 from markerscope.solver.core.rotations import log_so3
-from markerscope.solver.core.skeleton import JOINTS, PARTS
 from markerscope.solver.fit.bundle import FINE, Fit, descend, relax, settled_again
 from markerscope.solver.fit.converge import Settled
 from markerscope.solver.fit.counting import candidate_number
@@ -22,6 +21,7 @@ from markerscope.solver.fit.doubts.still import still_markers
 from markerscope.solver.fit.ending import motion_from
 from markerscope.solver.fit.kinematics import Points, Pose, forward, place_points
 from markerscope.solver.fit.localize import Hypothesis, Search, hypotheses
+from markerscope.solver.fit.parts import part_name
 from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.problem import Problem
 from markerscope.solver.fit.pull.stage import to_landmarks
@@ -39,6 +39,8 @@ _SIFTINGS = 2
 _FEWEST = 3
 _CLEAR, _LOOSE_SHARE = 1.15, 0.1
 """An answer that is less clear than this, or leaves more of the markers off their places, may have a wrong video."""
+_NEARER = 0.95
+"""The mirror image of a right video lies at best as near to the markers (0.99 and more), a mirrored one's nearer."""
 
 
 def localize(
@@ -155,7 +157,7 @@ def orient(
     ----------
     try_mirror : where the answer contradicts the video, see what its mirror image costs
     """
-    from markerscope.solver.fit.confidence import judge
+    from markerscope.solver.fit.confidence import is_whole, judge, stillness
 
     used = replace(seen, markers=seen.markers[:, found.markers])
     guesses = tuple(
@@ -206,20 +208,33 @@ def orient(
     if try_mirror and camera is None and best.refined:
         joint = np.where(far, -1, best.bone)
         loose = loose_share(body, fits[0], used.at(found.many).markers) > _LOOSE_SHARE
-        doubtful = both_sides(joint) and (ranked.margin < _CLEAR or far.any() or loose)
-        if doubtful or video_in_doubt(best.rotations, used.at(found.many), joint, best.camera.reprojection_px):
-            ranked = replace(ranked, mirror=best.energy / _mirrored_energy(body, used, landmarks, found, settings))
+        stands = is_whole(joint) and bool(stillness(best.rotations, joint))
+        in_doubt = video_in_doubt(best.rotations, used.at(found.many), joint, best.camera.reprojection_px)
+        unclear = ranked.margin < _CLEAR or bool(far.any()) or loose or stands
+        if in_doubt or (both_sides(joint) and (unclear or _mirror_lies_nearer(body, used, found))):
+            mirror = best.energy / _mirrored_energy(body, used, landmarks, found, settings)
+            ranked = replace(judge(candidates, ~far, mirror), far=ranked.far)
     return ranked
+
+
+def _laid_in_mirror(body: Body, used: Observations, found: Localization) -> tuple[Observations, Localization]:
+    """The markers with the video's mirror image, and where on its body they sit."""
+    seen = in_mirror(used)
+    few, many = len(found.few), len(found.many)
+    own = LocalizeSettings(few=few, many=many, leave_out_still=False, part_of_cloud=1)
+    return seen, localize(body, seen, ~np.isfinite(seen.markers).all(axis=2).any(axis=0), own)
+
+
+def _mirror_lies_nearer(body: Body, used: Observations, found: Localization) -> bool:
+    """Whether the video's mirror image, laid over the markers, comes nearer to them than the video does."""
+    return bool(_laid_in_mirror(body, used, found)[1].cost_mm[0] < _NEARER * found.cost_mm[0])
 
 
 def _mirrored_energy(
     body: Body, used: Observations, landmarks: Points, found: Localization, settings: OrientSettings
 ) -> float:
     """What the best answer costs with the video's mirror image."""
-    seen = in_mirror(used)
-    few, many = len(found.few), len(found.many)
-    own = LocalizeSettings(few=few, many=many, leave_out_still=False, part_of_cloud=1)
-    again = localize(body, seen, ~np.isfinite(seen.markers).all(axis=2).any(axis=0), own)
+    seen, again = _laid_in_mirror(body, used, found)
     ranked = orient(body, seen, landmarks, again, replace(settings, leave_out_far=False), try_mirror=False)
     return ranked.candidates[0].energy
 
@@ -399,20 +414,3 @@ def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem, steps: 
         steps=steps,
         behind=fitted.behind,
     )
-
-
-_MOST, _FAR = 0.6, 1 / 3
-"""The share of the markers that names a part, and the share beyond a limb's first bone that makes it that limb."""
-
-
-def part_name(bone: np.ndarray) -> str:
-    """The part of the body that carries most of the markers, in words."""
-    carried = {JOINTS[b] for b in bone}
-    if len(carried) > 8 or ({"left", "right"} <= {name.split("_")[0] for name in carried} and len(carried) > 4):
-        return "whole body" if len(carried) > 10 else "several parts"
-    shares = {part: np.mean([JOINTS[b] in names for b in bone]) for part, names in PARTS.items()}
-    # An arm with a marker on the acromion is an arm as long as its forearm carries its share.
-    far = {part: np.mean([JOINTS[b] in names[1:] for b in bone]) for part, names in PARTS.items()}
-    limbs = [part for part in PARTS if not part.endswith("shoulder") and shares[part] >= _MOST and far[part] >= _FAR]
-    best = max(limbs or PARTS, key=lambda part: shares[part])
-    return best.replace("_", " ") if shares[best] >= _MOST else ", ".join(sorted(carried)).replace("_", " ")

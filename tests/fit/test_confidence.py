@@ -72,10 +72,12 @@ def test_a_subject_that_stands_still_is_never_sure_however_large_the_margin() ->
 
 def test_a_whole_body_that_stands_still_is_told_by_its_shape_where_the_answer_is_clear() -> None:
     whole = [*range(22)]
-    clear, near = (judge((candidate(10.0, whole, 2.0), candidate(energy, whole[::-1], 2.0))) for energy in (15.0, 12.0))
-    assert clear.confidence > 0.95 and clear.warnings == ()
-    assert near.confidence == 0.6 and "hardly moves" in near.warnings[0]
-    apart = judge((candidate(10.0, whole[1:10], 2.0), candidate(15.0, whole[10:19], 2.0)))
+    far, close = ((candidate(10.0, whole, 2.0), candidate(energy, whole[::-1], 2.0)) for energy in (15.0, 12.0))
+    clear = judge(far, mirror=0.7)
+    assert clear.confidence > 0.95 and clear.warnings == () and clear.mirror == 0.7
+    for unclear in (judge(close, mirror=0.7), judge(far, mirror=0.9), judge(far, mirror=2.0), judge(far)):
+        assert unclear.confidence == 0.6 and "hardly moves" in unclear.warnings[0]
+    apart = judge((candidate(10.0, whole[1:10], 2.0), candidate(15.0, whole[10:19], 2.0)), mirror=0.7)
     assert apart.confidence == 0.6, "two legs and the lower back are no whole body"
 
 

@@ -11,7 +11,7 @@ from markerscope.solver.body.model import Body
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.rotations import exp_so3
 from markerscope.solver.core.skeleton import INDEX
-from markerscope.solver.fit import method
+from markerscope.solver.fit import confidence, method
 from markerscope.solver.fit.bundle import Fit
 from markerscope.solver.fit.doubts.clouds import clouds
 from markerscope.solver.fit.doubts.mirror import in_mirror
@@ -119,3 +119,26 @@ def test_a_mirrored_video_is_found_by_its_mirror_image(scene: Scene) -> None:
     found = localize(scene.body, mirrored.seen, np.zeros(36, bool), QUICK)
     ranked = orient(scene.body, mirrored.seen, mirrored.landmarks, found, WIDE)
     assert ranked.mirror > 1.5, f"the right way round it costs {ranked.mirror:.2f} times less"
+
+
+def test_the_mirror_image_is_tried_where_it_lies_nearer_though_nothing_else_is_wrong(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(method, "video_in_doubt", lambda *given: False)
+    monkeypatch.setattr(method, "loose_share", lambda *given: 0.0)
+    for seen, tried in ((scene.seen, False), (in_mirror(scene.seen), True)):
+        found = localize(scene.body, seen, np.zeros(36, bool), QUICK)
+        ranked = orient(scene.body, seen, scene.landmarks, found, replace(WIDE, leave_out_far=False))
+        assert ranked.margin > 1.15, "a near tie would be a reason of its own"
+        assert (ranked.mirror > 1.3) == tried and np.isnan(ranked.mirror) != tried
+
+
+def test_the_mirror_image_is_tried_where_a_whole_body_hardly_moves(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(confidence, "stillness", lambda *given: ("The person hardly moves.",))
+    found = localize(scene.body, scene.seen, np.zeros(36, bool), QUICK)
+    ranked = orient(scene.body, scene.seen, scene.landmarks, found, WIDE)
+    assert ranked.mirror < 0.7 and ranked.warnings == (), "its shape tells it, and not that of the mirrored video"
+    untried = orient(scene.body, scene.seen, scene.landmarks, found, WIDE, try_mirror=False)
+    assert np.isnan(untried.mirror) and untried.confidence <= 0.6

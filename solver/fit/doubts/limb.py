@@ -10,9 +10,23 @@ LEAST_LEAD = 4.6
 """Nats by which the offset must be ahead of every other, where the sync is not sure of it."""
 
 
+def sure_of_side(seen: Evidence, confidence: float) -> float:
+    """0..1, of a confidence that holds if the offset is right; if not, a lone limb is as likely the other side's.
+
+    What was pinned by hand (1) stays.
+    """
+    if confidence >= 1 or len(_sides(seen)) != 1:
+        return confidence
+    return seen.sync_confidence * confidence + (1 - seen.sync_confidence) * min(confidence, 0.5)
+
+
+def _sides(seen: Evidence) -> set[str]:
+    return {JOINTS[j].split("_")[0] for j in seen.joint if j >= 0 and "_" in JOINTS[j]}
+
+
 def lone_limb(seen: Evidence) -> Doubt | None:
     """Say that left and right cannot be told apart where another offset is as good: half a cycle swaps the legs."""
-    sides = {JOINTS[j].split("_")[0] for j in seen.joint if j >= 0 and "_" in JOINTS[j]}
+    sides = _sides(seen)
     if len(sides) != 1 or seen.sync_confidence >= LEAST_SYNC or not seen.sync_lead < LEAST_LEAD:
         return None
     side = sides.pop()

@@ -7,7 +7,7 @@ import numpy as np
 from markerscope.solver.body.model import Body
 from markerscope.solver.fit.confidence import same_answer, stillness
 from markerscope.solver.fit.kinematics import Points
-from markerscope.solver.fit.method import part_name
+from markerscope.solver.fit.parts import part_name
 from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.published.motion import camera_of, full_shape
 from markerscope.solver.fit.published.results import BodyState, PaperLocalization, PaperSolve
