@@ -119,8 +119,8 @@ def pictures(window: MainWindow, spin: Spin, out: Path) -> None:
         keep(docks[name], out / f"{file}.png")
 
     bench.clock.seek(3.2)
-    window.scene.view_from("isometric")
-    window.scene.view_from("fit")
+    window.table.trigger("camera.isometric")
+    window.table.trigger("camera.fit")
     window.scene.orbit(-0.4, -0.15)
     bench.selection.clear()
     for name in ("stages", "timelines", "affinity"):

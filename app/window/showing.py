@@ -31,6 +31,8 @@ class Showing:
     def show(self, what: str) -> None:
         """Show one thing by its name."""
         kind, _, name = what.partition(".")
+        if kind == "camera":
+            self.window.draw_now()  # the camera frames what is drawn
         if what == "camera.selected":
             self.window.scene.frame_selected()
         elif kind == "camera":

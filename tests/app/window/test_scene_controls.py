@@ -127,6 +127,22 @@ def test_digits_colour_and_with_ctrl_look(window: MainWindow, spin: Callable[...
     assert {"1", "5", "Ctrl+1", "Ctrl+5", "Q", "O", "Shift+T"} <= {*said}
 
 
+@pytest.mark.parametrize("action", ["camera.fit", "camera.selected"])
+def test_the_camera_frames_what_the_clock_shows_though_it_was_not_drawn_yet(
+    window: MainWindow, spin: Callable[..., None], action: str
+) -> None:
+    clock = window.bench.clock
+    clock.seek(clock.timing.span[0])
+    spin()
+    clock.seek(clock.timing.span[1])
+    window.table.trigger(action)
+    found = window.scene.camera_state()
+    spin()
+    window.table.trigger(action)
+    again = window.scene.camera_state()
+    assert found["target"] == pytest.approx(again["target"], abs=0.01), "but for the mesh that is refined at rest"
+
+
 def test_a_box_selects_without_shift_in_its_mode(window: MainWindow, spin: Callable[..., None]) -> None:
     scene = window.scene
     window.table.trigger("camera.fit")
