@@ -65,7 +65,8 @@ class Place:
 def from_wheel(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Place:
     place = Place(tmp_path_factory.mktemp("installed"))
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", place.python, "install", "--quiet"]
-    subprocess.run([*pip, "--no-deps", "--no-index", wheel], check=True)
+    # What an editable install of an earlier version left in the tree, which is on the path, would count as installed.
+    subprocess.run([*pip, "--no-deps", "--no-index", "--ignore-installed", wheel], check=True)
     return place
 
 
