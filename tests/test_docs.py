@@ -9,7 +9,14 @@ from pathlib import Path
 import pytest
 
 from markerscope.solver.body.bones import MODES
-from markerscope.solver.fit.state import Energies
+from markerscope.solver.fit.labelled.anchored import Anchors
+from markerscope.solver.fit.pull.term import Pull
+from markerscope.solver.fit.terms.height import Height
+from markerscope.solver.fit.terms.image import ImageLandmarks
+from markerscope.solver.fit.terms.markers import Markers
+from markerscope.solver.fit.terms.posture import Posture
+from markerscope.solver.fit.terms.shape import Shape
+from markerscope.solver.fit.terms.video_pose import VideoPose
 from markerscope.solver.pipeline.stages import GRAPH, SOURCES
 from markerscope.solver.report.outputs import FILES, SOMETIMES
 
@@ -75,7 +82,8 @@ def test_every_setting_is_described_with_its_default() -> None:
 
 def test_every_stage_and_kind_of_evidence_is_described() -> None:
     text = (DOCS / "how-it-works.md").read_text(encoding="utf-8")
-    for name in [stage.name for stage in GRAPH] + [field.name for field in dataclasses.fields(Energies)]:
+    kinds = (Markers, ImageLandmarks, VideoPose, Posture, Shape, Height, Pull, Anchors)
+    for name in [stage.name for stage in GRAPH] + [kind.name for kind in kinds]:
         assert f"| `{name}` |" in text, name
 
 

@@ -23,7 +23,8 @@ from markerscope.solver.fit.localize import Hypothesis
 from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.problem import Problem
 from markerscope.solver.fit.refine import carried_over
-from markerscope.solver.fit.state import Camera, Energies, Observations, State, Surface, Weights
+from markerscope.solver.fit.state import Camera, Observations, State, Surface, Weights
+from markerscope.solver.fit.terms.term import Energies
 
 _SAME_ENERGY = 1.03
 _SAME_TURN = np.radians(3.0)

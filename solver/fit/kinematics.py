@@ -35,6 +35,11 @@ class Points:
         return cls(body.template[vertices], body.shape_dirs[vertices], body.weights[vertices])
 
     @classmethod
+    def none(cls, shapes: int) -> Points:
+        """No points, of a body with so many shape coefficients."""
+        return cls(np.zeros((0, 3)), np.zeros((0, 3, shapes)), np.zeros((0, len(JOINTS))))
+
+    @classmethod
     def joined(cls, first: Points, second: Points) -> Points:
         """Both sets as one."""
         return cls(*(np.concatenate([getattr(first, k), getattr(second, k)]) for k in ("rest", "dirs", "weights")))

@@ -18,7 +18,7 @@ from markerscope.solver.core.landmarks import LANDMARKS, Landmarks
 from markerscope.solver.core.prior import PosePrior
 from markerscope.solver.core.progress import Progress, silent
 from markerscope.solver.core.rotations import kabsch, slerp
-from markerscope.solver.core.skeleton import INDEX, JOINTS, PARENTS
+from markerscope.solver.core.skeleton import INDEX, PARENTS
 from markerscope.solver.fit import anatomical
 from markerscope.solver.fit.kinematics import Points, Pose
 from markerscope.solver.fit.problem import Problem
@@ -93,7 +93,7 @@ def _fit(
         course = _smoothed(state.pose.rotations, time) if round_ else state.pose.rotations
         weights = _WEIGHTS if round_ else replace(_WEIGHTS, prior_deg=90.0, root_deg=90.0)
         seen = Observations(target, course, np.ones(frames, bool), none[..., None].repeat(2, -1), none, (0, 0))
-        problem = Problem(body, seen, _NO_POINTS)
+        problem = Problem(body, seen, Points.none(body.shape_count))
         steps, damping = (8 if not round_ else 2), 1e-3
         cost = problem.energies(state, weights, surface).total
         for _ in range(steps):
@@ -104,9 +104,6 @@ def _fit(
             else:
                 damping *= 10
     return state.pose.rotations
-
-
-_NO_POINTS = Points(np.zeros((0, 3)), np.zeros((0, 3, 18)), np.zeros((0, len(JOINTS))))
 
 
 def _start(body: Body, points: Points, column: np.ndarray, target: np.ndarray) -> State:

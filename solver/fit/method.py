@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -394,7 +394,7 @@ def _candidate(body: Body, fitted: Fit, hypothesis: int, whole: Problem, steps: 
     return Candidate(
         hypothesis=hypothesis,
         refined=fitted.refined,
-        energies=asdict(fitted.energies),
+        energies=dict(fitted.energies.by_term),
         energy=fitted.energies.total,
         bone=bone,
         vertex=vertex,

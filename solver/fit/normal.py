@@ -75,6 +75,7 @@ class NormalEquations:
         self.h_ss = np.zeros((shared, shared))
         self.g_f = np.zeros((frames, POSE_SIZE))
         self.g_s = np.zeros(shared)
+        self._joints: tuple[np.ndarray, np.ndarray] | None = None
 
     def add_rows(
         self,
@@ -100,6 +101,26 @@ class NormalEquations:
             flat = by_shared.reshape(-1, by_shared.shape[2])
             self.h_ss[shared, shared] += flat.T @ flat
             self.g_s[shared] += flat.T @ residual.ravel()
+
+    def add_joints(self, square: np.ndarray, slope: np.ndarray) -> None:
+        """What acts on each joint alone, (F, K, 3, 3) and (F, K, 3), both then ours; ``gathered`` adds it to the rest.
+
+        Writing to the blocks along many diagonals is slow, so it is done once.
+        """
+        if self._joints is None:
+            self._joints = square, slope
+        else:
+            self._joints[0][:] += square
+            self._joints[1][:] += slope
+
+    def gathered(self) -> NormalEquations:
+        """Itself, with what acts on joints alone added."""
+        if self._joints is not None:
+            square, slope = self._joints
+            diagonal_blocks(self.h_ff)[:-1] += square.swapaxes(0, 1)
+            self.g_f[:, :-3] += slope.reshape(len(slope), -1)
+            self._joints = None
+        return self
 
     def solve(self, free: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
         """Step of each frame (F, 69) and of the shared unknowns; those not ``free`` stay at zero."""

@@ -34,7 +34,7 @@ def observe(
     rotations, tracked = on_clock(prior, markers.time, offset, rate_ratio)
     if landmarks is None:
         none = np.zeros((len(wanted), 0))
-        points = Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
+        points = Points.none(body.shape_count)
         image = none[..., None].repeat(2, -1)
         return Observations(markers.positions, rotations, tracked, image, none, (0, 0), _shape(prior, body)), points
     points, column = landmark_points(body)

@@ -12,8 +12,8 @@ from markerscope.solver.core.rotations import slerp
 from markerscope.solver.fit.converge import Settled, settle
 from markerscope.solver.fit.kinematics import Points, Pose, forward, place_points
 from markerscope.solver.fit.problem import person_height
-from markerscope.solver.fit.residuals import marker_residual
 from markerscope.solver.fit.state import Observations, State, Surface, Weights
+from markerscope.solver.fit.terms.markers import marker_residual
 
 _STRIDES = (4, 2, 1)
 """Every so many frames are solved first; those between start from what these found."""

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from markerscope.solver.fit.kinematics import Points, Pose
+
+if TYPE_CHECKING:
+    from markerscope.solver.fit.terms.term import Evidence
 
 FREE = np.array([0, 1, 4, 7, 10, 2, 5, 8, 11, 3, 6, 9, 12, 15, 13, 16, 18, 20, 14, 17, 19, 21])
 """Joints that a fit turns: all but the hands, which neither markers nor landmarks show. In the order of their unknowns:
@@ -28,6 +33,7 @@ class Observations:
     visibility : (N, L) 0..1
     image_size : (width, height) px; (0, 0) without landmarks
     shape : (B,) the first shape coefficients as the video has them, where it was told of a body of this kind
+    further : whatever else is known, each a term of the energy with its data
     """
 
     markers: np.ndarray
@@ -37,11 +43,13 @@ class Observations:
     visibility: np.ndarray
     image_size: tuple[int, int]
     shape: np.ndarray | None = None
+    further: tuple[Evidence, ...] = ()
 
     def at(self, frames: np.ndarray | slice) -> Observations:
         """Some of the frames."""
         names = ("markers", "prior", "tracked", "image", "visibility")
-        return replace(self, **{name: getattr(self, name)[frames] for name in names})
+        further = tuple(term.of_frames(frames) for term in self.further)
+        return replace(self, further=further, **{name: getattr(self, name)[frames] for name in names})
 
     @property
     def lab_centre(self) -> np.ndarray:
@@ -153,17 +161,21 @@ class Surface:
 
 
 @dataclass(frozen=True)
-class Energies:
-    """The cost of a state by kind of evidence, each per frame."""
+class Unknowns:
+    """Where the unknowns that all frames share stand in the normal equations."""
 
-    markers: float
-    prior: float
-    anatomical: float
-    image: float
-    shape: float
-    placement: float
+    shape: slice
+    camera: slice
+    bias: slice
+    placement: slice
+
+    @classmethod
+    def of(cls, shapes: int, markers: int) -> Unknowns:
+        """For so many shape coefficients and markers."""
+        ends = np.cumsum([0, shapes, CAMERA_SIZE, 3 * len(FREE), 3 * markers]).tolist()
+        return cls(*(slice(start, stop) for start, stop in pairwise(ends)))
 
     @property
-    def total(self) -> float:
-        """Sum of all kinds."""
-        return self.markers + self.prior + self.anatomical + self.image + self.shape + self.placement
+    def size(self) -> int:
+        """How many there are."""
+        return int(self.placement.stop)

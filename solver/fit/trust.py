@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from markerscope.solver.fit.residuals import bias_residual, video_residual
 from markerscope.solver.fit.state import FREE, Observations, State, Weights
+from markerscope.solver.fit.terms.video_pose import bias_residual, video_residual
 
 _BELIEVED_JOINTS = 2
 """What was believed before counts as much as this many joints do."""
@@ -34,7 +34,7 @@ def trusted(seen: Observations, state: State, weights: Weights) -> Weights:
     if not carried.any() or not watched.any():
         return weights
     bias = bias_residual(state)[carried]
-    wander = video_residual(seen, state, weights)[0][watched][:, carried]
+    wander = video_residual(seen.prior, seen.tracked, state, weights)[0][watched][:, carried]
     return replace(
         weights,
         bias_deg=_blended(weights.bias_deg, bias),

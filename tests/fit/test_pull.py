@@ -17,10 +17,10 @@ from markerscope.solver.fit.problem import Problem
 from markerscope.solver.fit.pull import mixture
 from markerscope.solver.fit.pull.by_hand import decided
 from markerscope.solver.fit.pull.earn import EARNED, Drawn, draw
-from markerscope.solver.fit.pull.problem import Pull, PulledProblem
 from markerscope.solver.fit.pull.results import said, summary, words_of
 from markerscope.solver.fit.pull.stage import to_landmarks
 from markerscope.solver.fit.pull.targets import skin_area, targets_of
+from markerscope.solver.fit.pull.term import Pull
 from markerscope.solver.fit.settings import FitSettings
 from markerscope.solver.fit.state import State, Surface, Weights
 from markerscope.solver.pipeline.settings import from_table, to_table
@@ -152,21 +152,21 @@ def test_the_slope_of_the_pull_is_the_finite_difference_of_its_cost(free_body: B
     targets = targets_of(free_body, state.pose.betas, weights.offset)
     chance = np.random.default_rng(0).random((5, len(targets.names)))
     plain = Problem(free_body, scene.seen, scene.landmarks)
-    pulled = PulledProblem(free_body, scene.seen, scene.landmarks, Pull.of(chance, 800.0, targets))
+    pull = Pull.of(chance, 800.0, targets)
+    pulled = Problem(free_body, replace(scene.seen, further=(pull,)), scene.landmarks)
     by = pulled.linearised(state, weights, surface), plain.linearised(state, weights, surface)
     slope, curvature = by[0].g_s - by[1].g_s, by[0].h_ss - by[1].h_ss
     assert np.allclose(by[0].g_f, by[1].g_f) and np.allclose(by[0].h_fs, by[1].h_fs)
 
     def cost(shared: np.ndarray) -> float:
         moved = plain._moved(state, np.zeros((FRAMES, by[0].g_f.shape[1])), shared)
-        one, other = (problem.energies(moved, weights, surface).placement for problem in (pulled, plain))
-        return FRAMES * (one - other)
+        return FRAMES * pulled.energies(moved, weights, surface)["landmark_pull"]
 
     rng = np.random.default_rng(2)
     for _ in range(6):
         step = np.zeros(len(slope))
-        step[plain.shape_at] = rng.normal(0, 0.1, plain.shape_at.stop)
-        step[plain.placement_at] = rng.normal(0, 0.005, 15)
+        step[plain.unknowns.shape] = rng.normal(0, 0.1, plain.unknowns.shape.stop)
+        step[plain.unknowns.placement] = rng.normal(0, 0.005, 15)
         ahead, back, here = cost(step), cost(-step), cost(np.zeros(len(slope)))
         # The pull is a quadratic form, so differences are exact.
         assert (ahead - back) / 4 == pytest.approx(slope @ step, rel=1e-6)

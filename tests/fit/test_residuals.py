@@ -15,14 +15,11 @@ from markerscope.solver.fit.bundle import reattach
 from markerscope.solver.fit.kinematics import Points, forward, place_points
 from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.problem import Problem
-from markerscope.solver.fit.residuals import (
-    focal_residual,
-    habit_residual,
-    image_residual,
-    marker_residual,
-    video_residual,
-)
 from markerscope.solver.fit.state import FREE, Camera, State, Surface, Weights
+from markerscope.solver.fit.terms.image import focal_residual, image_residual
+from markerscope.solver.fit.terms.markers import marker_residual
+from markerscope.solver.fit.terms.posture import habit_residual
+from markerscope.solver.fit.terms.video_pose import video_residual
 from tests.fit.conftest import Scene, simulate
 
 MARKERS = 12
@@ -57,7 +54,7 @@ def test_a_lost_marker_changes_neither_cost_nor_step(free_body: Body) -> None:
     fewer = replace(state, placement=state.placement.take(others))
     less = Surface(surface.point[others], surface.normal[others])
     costs = with_lost.energies(state, weights, surface), without.energies(fewer, weights, less)
-    assert costs[0].markers == pytest.approx(costs[1].markers, rel=1e-12)
+    assert costs[0]["markers"] == pytest.approx(costs[1]["markers"], rel=1e-12)
     assert costs[0].total == pytest.approx(costs[1].total, rel=1e-12), "its place is at the usual height"
 
     moved = with_lost.step(state, weights, surface, 1e-3), without.step(fewer, weights, less, 1e-3)
@@ -78,10 +75,10 @@ def test_a_landmark_out_of_sight_counts_as_one_that_is_not_there(free_body: Body
     person = Problem(free_body, scene.seen, scene.landmarks).person
     problems = []
     for pixels, visible in ((image, sight), (absent, sight), (image, np.ones_like(sight))):
-        problem = Problem(free_body, replace(scene.seen, image=pixels, visibility=visible), scene.landmarks)
-        problem.person = person  # its extent is measured over whatever landmarks there are
-        problems.append(problem)
-    unseen, none, believed = (problem.energies(state, weights, surface).image for problem in problems)
+        # The extent would be measured over whatever landmarks there are.
+        seen = replace(scene.seen, image=pixels, visibility=visible)
+        problems.append(Problem(free_body, seen, scene.landmarks, person))
+    unseen, none, believed = (problem.energies(state, weights, surface)["image"] for problem in problems)
     assert unseen == pytest.approx(none, rel=1e-12)
     assert believed > 1.5 * unseen
     steps = [problem.step(state, weights, surface, 1e-3) for problem in problems]
@@ -139,7 +136,7 @@ def test_a_joint_costs_what_cauchy_says_of_its_turn_from_the_video_less_the_bias
     prior[:, 0] = state.camera.R_lab_cam.T @ prior[:, 0] @ exp_so3(np.array([0, 0, -root]))
     bias = state.bias.copy()
     bias[list(FREE).index(INDEX["left_knee"])] = exp_so3(np.array([biased, 0, 0]))
-    residual, weight, cost = video_residual(replace(scene.seen, prior=prior), replace(state, bias=bias), weights)
+    residual, weight, cost = video_residual(prior, scene.seen.tracked, replace(state, bias=bias), weights)
     expected = np.zeros(len(FREE))
     for name, angle, spread_deg in (("left_knee", turned - biased, 18.0), ("pelvis", root, 25.0)):
         at = list(FREE).index(INDEX[name])

@@ -84,4 +84,4 @@ def test_its_cost_counts_by_the_spread_that_is_stated(smpl: Body) -> None:
     state = State(replace(scene.pose, betas=off), placement, scene.camera)
     weights = Weights(video_shape=0.7)
     told = Problem(smpl, replace(scene.seen, shape=SHAPE), scene.landmarks).energies(state, weights, surface)
-    assert told.shape == pytest.approx(10 * (0.35 / 0.7) ** 2 + (smpl.shape_count - 10) * 0.25)
+    assert told["shape"] == pytest.approx(10 * (0.35 / 0.7) ** 2 + (smpl.shape_count - 10) * 0.25)

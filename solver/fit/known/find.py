@@ -136,7 +136,7 @@ def _bent(body: Body, known: KnownBody, points: np.ndarray, start: Pose) -> Foun
     camera = Camera(np.eye(3), np.zeros(3), np.zeros(3), 1.0)
     count = len(known.placement.rest)
     surface = Surface(np.zeros((count, 3)), np.tile([0.0, 0, 1], (count, 1)))
-    none = Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
+    none = Points.none(body.shape_count)
     pose = start
     for reach in _REACH_M:
         match = _matched(_placed(body, known, pose), points, reach)

@@ -88,7 +88,7 @@ def _solved(
     progress: Progress = silent,
 ) -> Settled:
     """Every frame on its own, the kernel narrowing; where no marker decides, joints stay as they start."""
-    landmarks = Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
+    landmarks = Points.none(body.shape_count)
     seen = replace(seen, prior=start.rotations, tracked=np.ones(len(seen.markers), bool))
     return settle(body, seen, landmarks, fitted, surface, held, start, _WIDEST, progress)
 

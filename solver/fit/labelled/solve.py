@@ -19,8 +19,8 @@ from markerscope.solver.core.progress import Progress, part_of, silent
 from markerscope.solver.fit.bundle import Phase, descend
 from markerscope.solver.fit.converge import Settled
 from markerscope.solver.fit.ending import motion_from
-from markerscope.solver.fit.kinematics import Pose
-from markerscope.solver.fit.labelled.anchored import AnchoredProblem
+from markerscope.solver.fit.kinematics import Points, Pose
+from markerscope.solver.fit.labelled.anchored import Anchors
 from markerscope.solver.fit.labelled.every_frame import every_frame
 from markerscope.solver.fit.labelled.places import FEWEST, Places, first_guess, places_of
 from markerscope.solver.fit.labelled.settle import settle
@@ -113,8 +113,9 @@ def solve_labelled(
     fits = []
     for i, start in enumerate(rigid_starts(body, placement, positions, betas)):
         part_of(progress, 0.25 * i, 0.25 * (i + 1))(0.0, "placing the markers")
-        seen = observed(positions[keyframes], start.at(keyframes))
-        problem = AnchoredProblem(body, seen, placement, places.vertex >= 0, settings.stray_mm / 1000)
+        anchors = Anchors(placement, places.vertex >= 0, settings.stray_mm / 1000)
+        seen = replace(observed(positions[keyframes], start.at(keyframes)), further=(anchors,))
+        problem = Problem(body, seen, Points.none(body.shape_count))
         state = State(start.at(keyframes), placement, camera)
         fits.append((start, *_first_stage(problem, state, surface, places, weights)))
     start, state, surface, _ = min(fits, key=lambda fit: fit[3])

@@ -119,7 +119,7 @@ def camera_of(body: Body, used: Observations, landmarks: Points, state: BodyStat
     problem = Problem(body, used, landmarks)
     pose = Pose(state.rotations, state.trans, full_shape(body, state.betas))
     camera = locate_camera(problem, pose, turn, Weights())
-    none = Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
+    none = Points.none(body.shape_count)
     position = camera.centre - camera.R_lab_cam @ camera.shift
     miss = problem.reprojection(State(pose, none, camera))
     return CameraResult(camera.R_lab_cam, position, camera.focal, used.image_size, miss)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from markerscope.solver.body.model import Body
 from markerscope.solver.fit.bundle import Phase, descend
 from markerscope.solver.fit.kinematics import Points
+from markerscope.solver.fit.problem import Problem
 from markerscope.solver.fit.pull import mixture
-from markerscope.solver.fit.pull.problem import Pull, PulledProblem
 from markerscope.solver.fit.pull.results import EARNED, LandmarkPull, nothing_drawn
 from markerscope.solver.fit.pull.targets import Targets, skin_area, targets_of
+from markerscope.solver.fit.pull.term import Pull
 from markerscope.solver.fit.state import Observations, State, Surface, Weights
 
 SPREADS = (0.025, 0.018, 0.012)
@@ -76,7 +77,7 @@ def draw(
             chance = np.where(fixed, 1.0, mixture.expectation(np.where(fixed, 0.0, given), share))
             share = mixture.share_of(chance[free]) if earned else 0.0
             pull = Pull.of(chance, _KAPPA / spread**2, targets)
-            problem = PulledProblem(body, seen, landmarks, pull)
+            problem = Problem(body, replace(seen, further=(*seen.further, pull)), landmarks)
             now, skin, _ = descend(problem, now, skin, (_PHASE,), weights)
             targets, distance = _distances(body, now, weights, allowed)
             believed = mixture.spread_of(chance, distance, SPREADS[-1], _BELIEVED_HITS)

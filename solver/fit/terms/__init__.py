@@ -1,0 +1,1 @@
+"""The terms of the energy: one module each, with its residual, what it costs, and its slope."""
