@@ -118,9 +118,8 @@ def _sync(given: Given) -> Any:
     stages = {stage.name: stage for stage in GRAPH}
     before = run_stages("bundle", given, {}, "clean", silent)[0]
     sync = stages["sync"]
-    return sync.run(
-        {name: before.get(name, given.prior) for name in sync.inputs} | {"landmarks": None}, sync.settings(), silent
-    )
+    inputs = {name: before.get(name, given.prior) for name in sync.inputs} | {"landmarks": None}
+    return sync.run(sync.settings(), silent, **inputs)
 
 
 def table(rows: list[dict[str, Any]]) -> list[str]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from markerscope.solver.core.rotations import log_so3
 from markerscope.solver.core.skeleton import JOINTS, PARENTS, mirror_index
+from markerscope.solver.fit.counting import candidate_number
 from markerscope.solver.fit.doubts.turn import holds_pelvis
 from markerscope.solver.fit.results import Candidate, Orientation
 
@@ -21,11 +22,11 @@ clear beside that of the mirrored video as well. Of eleven whole bodies that har
 """
 _STEEPNESS = 8.5
 """Told from 400 synthetic sessions of ``markerscope bench``: with it, which were right was likeliest."""
-_STEEPNESS_OF_LIMBS = 4.0
+STEEPNESS_OF_LIMBS = 4.0
 """Where nothing holds the pelvis, so side and heading rest on the video alone. Likeliest is 3.75 (95 %: 2.25 to 5.75):
 of 68 synthetic sessions with markers on limbs alone (``benchmarks/traps.py``) 13 were wrong, up to 1.9.
 """
-_UNRIVALLED = 0.95
+UNRIVALLED = 0.95
 """Where no other answer was found, or all that were followed ran into the best, nothing says how far the next is. Of 67
 synthetic sessions of that kind (``benchmarks/traps.py``) 66 were right."""
 
@@ -51,11 +52,41 @@ def judge(
     warnings = list(still)
     if rivals and margin < _TIE:
         warnings.append(_tie(best, candidates[runner_up], margin))
-    steepness = _STEEPNESS if holds_pelvis(bone) or is_whole(bone) else _STEEPNESS_OF_LIMBS
-    confidence = _sure(margin, steepness) if rivals else _UNRIVALLED
+    steepness = steepness_of(bone)
+    confidence = _sure(margin, steepness) if rivals else UNRIVALLED
     if still:
         confidence = min(confidence, 0.6)
     return Orientation(candidates, float(margin), runner_up, confidence, tuple(warnings), mirror=mirror)
+
+
+def chosen_by_hand(ranked: Orientation, row: int, steepness: float) -> tuple[float, tuple[str, ...]]:
+    """What the ranking says of a candidate that was pinned: a decision is no evidence, so it makes nothing surer.
+
+    Parameters
+    ----------
+    row : the candidate, in the ranking
+    steepness : of the method's confidence over the margin, as ``steepness_of``
+
+    Returns
+    -------
+    Its confidence, 0..1, and the ranking's warnings after a sentence that says who chose.
+    """
+    best, chosen = ranked.candidates[0], ranked.candidates[row]
+    if row == 0 or same_answer(best, chosen):
+        confidence = ranked.confidence
+    else:
+        times = _times(best, chosen)
+        confidence = _sure(1 / times, steepness) if np.isfinite(times) and times > 0 else 1 - UNRIVALLED
+    said = (
+        f"Candidate {candidate_number(row)} was pinned by hand; the confidence stays the ranking's own of this "
+        f"candidate, {100 * confidence:.0f} %."
+    )
+    return confidence, (said, *ranked.warnings)
+
+
+def steepness_of(bone: np.ndarray) -> float:
+    """How steeply the confidence rises with the margin, for markers on these bones (U,)."""
+    return _STEEPNESS if holds_pelvis(bone) or is_whole(bone) else STEEPNESS_OF_LIMBS
 
 
 def is_whole(bone: np.ndarray) -> bool:

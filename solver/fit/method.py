@@ -308,9 +308,13 @@ def fitted_motion(
     """
     row = chosen_row(ranked, settings)
     camera = ranked.candidates[row].camera
-    pinned = settings.candidate is not None
     kept = ~np.isin(found.markers, ranked.far)
     bone, vertex = _sites(body, state)
+    confidence, warnings = ranked.confidence, ranked.warnings
+    if settings.candidate is not None:
+        from markerscope.solver.fit.confidence import chosen_by_hand, steepness_of
+
+        confidence, warnings = chosen_by_hand(ranked, row, steepness_of(bone[kept]))
     return motion_from(
         body,
         seen.markers,
@@ -321,8 +325,8 @@ def fitted_motion(
         (bone[kept], vertex[kept]),
         camera=_written(state.camera, camera.image_size, camera.reprojection_px),
         chosen=row,
-        confidence=1.0 if pinned else ranked.confidence,
-        warnings=(f"Candidate {candidate_number(row)} was pinned by hand.",) if pinned else ranked.warnings,
+        confidence=confidence,
+        warnings=warnings,
     )
 
 

@@ -153,7 +153,7 @@ GRAPH = (
     ),
     Stage(
         "fit",
-        5,
+        6,
         FitSettings,
         (*FITTED_TO, "localize", "orient"),
         fitting.fit_every_frame,
@@ -197,7 +197,7 @@ GRAPH = (
     ),
     Stage(
         "check",
-        1,
+        2,
         NoSettings,
         ("clean", "prior", "sync", "segment", "localize", "orient", "fit", "surface"),
         fitting.check_result,

@@ -146,7 +146,7 @@ _OWN = (
     ),
     Stage(
         "fit",
-        2,
+        3,
         NeuralFitSettings,
         (*FITTED_TO, "localize", "orient", "network", "weights_file"),
         fit_from_poses,

@@ -124,7 +124,7 @@ _OWN = (
     ),
     Stage(
         "orient",
-        1,
+        2,
         NoSettings,
         (*FITTED_TO, "localize", "solve"),
         rank_yaws,
@@ -135,7 +135,7 @@ _OWN = (
     ),
     Stage(
         "fit",
-        1,
+        2,
         PaperFitSettings,
         (*FITTED_TO, "localize", "solve", "orient"),
         every_frame,

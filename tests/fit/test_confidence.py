@@ -8,7 +8,7 @@ import pytest
 from markerscope.solver.core.camera import CameraResult
 from markerscope.solver.core.rotations import exp_so3
 from markerscope.solver.core.skeleton import INDEX, JOINTS
-from markerscope.solver.fit.confidence import judge
+from markerscope.solver.fit.confidence import STEEPNESS_OF_LIMBS, UNRIVALLED, chosen_by_hand, judge
 from markerscope.solver.fit.results import Candidate, Orientation
 
 LEG = [INDEX[name] for name in ("left_hip", "left_hip", "left_knee", "left_knee", "left_ankle", "left_ankle")]
@@ -94,3 +94,30 @@ def test_the_nearest_different_answer_is_the_rival() -> None:
     found = judge((best, alike, rival, coarse))
     assert found.runner_up == 2, "the same answer again and one that was never refined say nothing"
     assert found.margin == pytest.approx(1.5)
+
+
+def test_a_pinned_candidate_is_as_sure_as_the_ranking_says() -> None:
+    """The two shares of two rivals are one whole; the warnings of the ranking stay, and who chose is said apart."""
+    still = judge((candidate(10.0, LEG, 2.0), candidate(11.0, ARM, 2.0)))
+    assert any("hardly moves" in said for said in still.warnings) and len(still.warnings) == 2
+    first, said = chosen_by_hand(still, 0, STEEPNESS_OF_LIMBS)
+    assert first == still.confidence, "the best stays what it was"
+    second, said = chosen_by_hand(still, 1, STEEPNESS_OF_LIMBS)
+    assert second == pytest.approx(1 - first) and second < 0.5
+    assert said[0].startswith("Candidate 2 was pinned by hand") and f"{100 * second:.0f} %" in said[0]
+    assert said[1:] == still.warnings
+
+
+def test_a_pin_on_the_same_answer_again_says_what_the_best_says() -> None:
+    ranked = judge((candidate(10.0, LEG, 90.0), candidate(10.1, LEG, 90.0), candidate(15.0, ARM, 90.0)))
+    assert chosen_by_hand(ranked, 1, STEEPNESS_OF_LIMBS)[0] == ranked.confidence
+
+
+def test_a_pin_on_what_the_search_dropped_goes_by_how_far_it_was_behind() -> None:
+    best, dropped, never = candidate(10.0, LEG, 90.0), candidate(3.0, ARM, 90.0), candidate(2.0, ARM, 90.0)
+    for one, behind in ((dropped, 1.5), (never, float("nan"))):
+        object.__setattr__(one, "refined", False)
+        object.__setattr__(one, "behind", behind)
+    ranked = judge((best, dropped, never))
+    assert chosen_by_hand(ranked, 1, STEEPNESS_OF_LIMBS)[0] == pytest.approx(1 - ranked.confidence)
+    assert chosen_by_hand(ranked, 2, STEEPNESS_OF_LIMBS)[0] == pytest.approx(1 - UNRIVALLED)

@@ -199,6 +199,9 @@ def test_another_yaw_can_be_pinned(
     stage_4 = ranked.candidates[2]
     assert pinned.chosen == 2
     assert "pinned" in pinned.warnings[0]
+    assert pinned.warnings[1:] == ranked.warnings, "what speaks against the ranking stays"
+    times = stage_4.energy / ranked.candidates[0].energy
+    assert pinned.confidence == pytest.approx(1 / (1 + times)), "a decision by hand is no evidence"
     moved = np.linalg.norm(log_so3(np.swapaxes(pinned.rotations[:, 0], 1, 2) @ stage_4.rotations[:, 0]), axis=1)
     assert np.degrees(np.median(moved)) < 15, "stage 5 begins at the pinned yaw's stage 4"
     with pytest.raises(InputError, match="pin one of 1 to 4"):

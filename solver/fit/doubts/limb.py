@@ -11,11 +11,8 @@ LEAST_LEAD = 4.6
 
 
 def sure_of_side(seen: Evidence, confidence: float) -> float:
-    """0..1, of a confidence that holds if the offset is right; if not, a lone limb is as likely the other side's.
-
-    What was pinned by hand (1) stays.
-    """
-    if confidence >= 1 or len(_sides(seen)) != 1:
+    """0..1, of a confidence that holds if the offset is right; if not, a lone limb is as likely the other side's."""
+    if len(_sides(seen)) != 1:
         return confidence
     return seen.sync_confidence * confidence + (1 - seen.sync_confidence) * min(confidence, 0.5)
 

@@ -10,6 +10,7 @@ from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.progress import Progress, silent
 from markerscope.solver.core.rotations import kabsch, slerp
 from markerscope.solver.fit.bundle import locate_camera
+from markerscope.solver.fit.confidence import chosen_by_hand
 from markerscope.solver.fit.counting import candidate_number
 from markerscope.solver.fit.ending import motion_from
 from markerscope.solver.fit.kinematics import Points, Pose
@@ -17,7 +18,7 @@ from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.problem import Problem
 from markerscope.solver.fit.published.results import BodyState, PaperLocalization, PaperSolve
 from markerscope.solver.fit.published.sequence import sequence_of
-from markerscope.solver.fit.published.settings import PaperFitSettings
+from markerscope.solver.fit.published.settings import STEEPNESS, PaperFitSettings
 from markerscope.solver.fit.published.solve import refine
 from markerscope.solver.fit.results import FittedMotion, Orientation
 from markerscope.solver.fit.state import Observations, State, Weights
@@ -55,6 +56,9 @@ def motion_of(
         sequence = sequence_of(body, seen, found.frames, found.markers, len(state.betas))
         vertex, stage = refine(sequence, solved.yaws[chosen.hypothesis], solved.settings, progress)
         state = stage.body
+    confidence, warnings = ranked.confidence, ranked.warnings
+    if pinned is not None:
+        confidence, warnings = chosen_by_hand(ranked, row, STEEPNESS)
     at = time[found.frames]
     rotations = slerp(state.rotations, at, time)
     trans = np.stack([np.interp(time, at, state.trans[:, k]) for k in range(3)], axis=1)
@@ -68,8 +72,8 @@ def motion_of(
         solved.settings.offset,
         camera=chosen.camera,
         chosen=row,
-        confidence=ranked.confidence if pinned is None else 1.0,
-        warnings=ranked.warnings if pinned is None else (f"Candidate {candidate_number(row)} was pinned by hand.",),
+        confidence=confidence,
+        warnings=warnings,
     )
 
 

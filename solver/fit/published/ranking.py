@@ -5,21 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from markerscope.solver.body.model import Body
-from markerscope.solver.fit.confidence import same_answer, stillness
+from markerscope.solver.fit.confidence import UNRIVALLED, same_answer, stillness
 from markerscope.solver.fit.kinematics import Points
 from markerscope.solver.fit.parts import part_name
 from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.published.motion import camera_of, full_shape
 from markerscope.solver.fit.published.results import BodyState, PaperLocalization, PaperSolve
 from markerscope.solver.fit.published.sequence import chain_vertices, mesh_vertices, sequence_of, turned_video
-from markerscope.solver.fit.published.settings import PAPER_ITERATIONS
+from markerscope.solver.fit.published.settings import PAPER_ITERATIONS, STEEPNESS
 from markerscope.solver.fit.published.solve import nearest_on_average
 from markerscope.solver.fit.results import Candidate, Orientation
 from markerscope.solver.fit.state import Observations
 
 _CHAINS_SHOWN = 5
 _MM2 = 1e6
-_ONLY_ANSWER = 0.99
 
 
 def orientation_of(
@@ -117,5 +116,5 @@ def _judged(candidates: tuple[Candidate, ...], solved: PaperSolve) -> Orientatio
             f"{capped} of {len(descents)} optimisations were stopped at {solved.settings.iterations} iterations, "
             f"before they had converged; the paper allows {PAPER_ITERATIONS}."
         )
-    confidence = margin / (1 + margin) if rivals else _ONLY_ANSWER
+    confidence = 1 / (1 + margin**-STEEPNESS) if rivals else UNRIVALLED
     return Orientation(candidates, float(margin), rivals[0] if rivals else -1, float(confidence), tuple(warnings))

@@ -7,6 +7,8 @@ from typing import Literal
 
 PAPER_ITERATIONS = 10_000
 """What section 3.6 allows every optimisation."""
+STEEPNESS = 1.0
+"""Of the confidence over the margin; not calibrated, since the method itself gives none."""
 
 Mesh = Literal["coarse", "full"]
 """Vertices that a marker's nearest one is sought among. The paper's body has 6,890."""
