@@ -189,3 +189,10 @@ def table(path: Path) -> dict[str, np.ndarray]:
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     return {name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}
+
+
+@pytest.mark.parametrize("text", ["", " ", ":"])
+def test_no_pose_at_all_is_one_clear_sentence(text: str) -> None:
+    with pytest.raises(InputError, match="names no pose") as refused:
+        parse_neutral(text)
+    assert "--neutral" in str(refused.value) and "A:B" in str(refused.value)

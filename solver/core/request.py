@@ -181,7 +181,11 @@ def parse_neutral(text: str) -> tuple[float | None, float | None] | Path | Liter
     """A span ``A:B`` in seconds, ``recorded``, or the name of a file."""
     if text == RECORDED:
         return "recorded"
-    return parse_range(text, option("neutral")) if _SPAN.fullmatch(text) and text != ":" else Path(text)
+    if not text.strip() or text.strip() == ":":
+        raise InputError(
+            f'"{text}" names no pose', option("neutral"), f"give seconds A:B, the name of a file, or {RECORDED}"
+        )
+    return parse_range(text, option("neutral")) if _SPAN.fullmatch(text) else Path(text)
 
 
 def parse_range(text: str, where: str = "--range") -> tuple[float | None, float | None]:

@@ -179,7 +179,7 @@ def check_result(
     from markerscope.solver.fit.doubts.rigid import greatest_distance
     from markerscope.solver.fit.doubts.rules import verdict
     from markerscope.solver.fit.observe import on_clock
-    from markerscope.solver.sync.offset import lead
+    from markerscope.solver.sync.offset import lead, rival
 
     video, tracked = on_clock(prior, fit.time, sync.offset, sync.rate_ratio)
     still, cloud, taken = np.zeros(0, dtype=int), np.zeros(0, dtype=int), 0
@@ -199,6 +199,7 @@ def check_result(
         image_size=fit.camera.image_size,
         sync_confidence=sync.confidence,
         sync_lead=lead(sync),
+        sync_rival=rival(sync),
         still=still,
         cloud=cloud,
         taken=taken,

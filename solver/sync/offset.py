@@ -138,6 +138,12 @@ def lead(sync: Sync) -> float:
     return float(np.nanmax(sync.score)) - _rival(sync.lags, sync.score, sync.offset)[1]
 
 
+def rival(sync: Sync) -> float:
+    """The best offset beside the one that was found, s; NaN where no other was judged."""
+    lag, score = _rival(sync.lags, sync.score, sync.offset)
+    return lag if np.isfinite(score) else float("nan")
+
+
 def _likely(video: np.ndarray, markers: np.ndarray) -> tuple[float, float]:
     """Offsets, s, at which the shorter recording lies within the longer, and somewhat beyond.
 

@@ -15,9 +15,9 @@ from markerscope.solver.fit.doubts.agreement import agreement, disagreement
 from markerscope.solver.fit.doubts.clouds import clouds, one_body, several, taken_cloud
 from markerscope.solver.fit.doubts.doubt import CAP, Doubt, Evidence, named
 from markerscope.solver.fit.doubts.far import far, suspects
-from markerscope.solver.fit.doubts.limb import lone_limb
 from markerscope.solver.fit.doubts.mirror import both_sides, in_mirror, mirrored, video_in_doubt
 from markerscope.solver.fit.doubts.misfit import off_the_skin, off_their_places
+from markerscope.solver.fit.doubts.offset import lone_limb
 from markerscope.solver.fit.doubts.picture import off_the_picture
 from markerscope.solver.fit.doubts.rigid import greatest_distance, one_group
 from markerscope.solver.fit.doubts.rules import RULES, verdict
@@ -54,7 +54,7 @@ def sound(**changed: object) -> Evidence:
         reprojection=5.0,
         image_size=(720, 1280),
         sync_confidence=0.9,
-        sync_lead=20.0,
+        sync_lead=60.0,
         still=np.zeros(0, dtype=int),
         cloud=np.zeros(6, dtype=int),
         taken=0,
@@ -65,7 +65,7 @@ def sound(**changed: object) -> Evidence:
 
 def test_nothing_speaks_against_a_sound_solve() -> None:
     found = verdict(sound(), 0.97)
-    assert found.doubts == () and found.confidence == 0.97
+    assert found.doubts == () and found.confidence == pytest.approx(0.97, abs=0.005)
     assert found.nobody == () and found.suspect == ()
 
 
@@ -338,11 +338,19 @@ def test_a_limb_that_does_not_hold_the_pelvis_says_nothing_of_the_camera() -> No
 
 def test_a_lone_limb_is_doubted_only_where_another_offset_is_as_good() -> None:
     leg = np.array([1, 4, 7, 10, 1, 4])
-    assert lone_limb(sound(joint=leg, sync_confidence=0.2, sync_lead=0.3)) is not None
+    said = lone_limb(sound(joint=leg, sync_confidence=0.53, sync_lead=6.4, sync_rival=0.0))
+    assert said is not None and "+0.00 s is nearly as good" in said.sentence and "period" in said.sentence
     assert lone_limb(sound(joint=leg)) is None
-    assert lone_limb(sound(joint=leg, sync_confidence=0.2, sync_lead=9.0)) is None, "no other offset comes near"
+    assert lone_limb(sound(joint=leg, sync_confidence=0.2, sync_lead=16.0)) is None, "no other offset comes near"
     assert lone_limb(sound(sync_confidence=0.2, sync_lead=0.3)) is None, "markers on both sides tell them apart"
     assert lone_limb(sound(joint=np.array([0, 3, 6, 9, 12, 15]), sync_confidence=0.2, sync_lead=0.3)) is None
+
+
+def test_a_lone_limb_of_which_no_other_offset_could_be_compared_is_doubted_unless_it_was_given() -> None:
+    leg, none = np.array([1, 4, 7, 10, 1, 4]), float("inf")
+    said = lone_limb(sound(joint=leg, sync_confidence=0.2, sync_lead=none))
+    assert said is not None and "nearly as good" not in said.sentence
+    assert lone_limb(sound(joint=leg, sync_confidence=1.0, sync_lead=none)) is None
 
 
 def test_the_side_of_a_lone_limb_is_no_surer_than_the_offset() -> None:
@@ -352,8 +360,18 @@ def test_the_side_of_a_lone_limb_is_no_surer_than_the_offset() -> None:
         "it makes nothing surer"
     )
     assert verdict(sound(joint=leg, sync_confidence=1.0), 0.97).confidence == pytest.approx(0.97)
-    assert verdict(sound(sync_confidence=0.5), 0.97).confidence == 0.97, "two sides tell themselves apart"
     assert verdict(sound(joint=leg, sync_confidence=0.5), 1.0).confidence == pytest.approx(0.75), "none is beyond it"
+
+
+def test_a_whole_body_is_no_surer_than_that_its_offset_is_not_grossly_wrong() -> None:
+    by_lead = [verdict(sound(sync_lead=lead), 0.97).confidence for lead in (0.0, 1.0, 9.6, 16.0, 60.0, float("inf"))]
+    assert by_lead[0] == pytest.approx(0.5) and by_lead[1] < 0.6, "another offset is as good: a guess"
+    assert 0.6 < by_lead[2] < 0.85 and by_lead[3] > 0.85 and by_lead[4] > 0.96
+    assert by_lead[:5] == sorted(by_lead[:5])
+    assert verdict(sound(sync_lead=0.0), 0.3).confidence == pytest.approx(0.3), "it makes nothing surer"
+    none = float("inf")
+    assert verdict(sound(sync_lead=none, sync_confidence=0.2), 0.97).confidence < 0.6, "no other could be compared"
+    assert verdict(sound(sync_lead=none, sync_confidence=1.0), 0.97).confidence == pytest.approx(0.97), "it was given"
 
 
 # mirror -------------------------------------------------------------------------------------------------------------

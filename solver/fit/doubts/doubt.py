@@ -50,6 +50,7 @@ class Evidence:
     image_size : (width, height) px
     sync_confidence : 0..1, of the offset between the clocks; 1 where it was given
     sync_lead : nats by which the offset is ahead of every other that was tried; infinite where it was given
+    sync_rival : s, the best other offset; NaN where none was judged
     still : columns of markers that stand while the others move
     cloud : (M,) number of the cloud that each marker belongs to, 0 the largest; -1 for none
     taken : number of the cloud that was solved
@@ -78,6 +79,7 @@ class Evidence:
     far: np.ndarray
     mirror: float = float("nan")
     span: float = float("nan")
+    sync_rival: float = float("nan")
     said: tuple[str, ...] = ()
 
 

@@ -9,9 +9,9 @@ from markerscope.solver.fit.doubts.agreement import disagreement
 from markerscope.solver.fit.doubts.clouds import several
 from markerscope.solver.fit.doubts.doubt import CAP, Doubt, Evidence
 from markerscope.solver.fit.doubts.far import far, suspects
-from markerscope.solver.fit.doubts.limb import lone_limb, sure_of_side
 from markerscope.solver.fit.doubts.mirror import mirrored
 from markerscope.solver.fit.doubts.misfit import off_the_skin, off_their_places
+from markerscope.solver.fit.doubts.offset import lone_limb, sure_of_offset
 from markerscope.solver.fit.doubts.picture import off_the_picture
 from markerscope.solver.fit.doubts.rigid import one_group
 from markerscope.solver.fit.doubts.still import still
@@ -39,7 +39,7 @@ class Verdict:
 
     Attributes
     ----------
-    confidence : 0..1, that of the ranking, less where a lone limb's side rests on an offset that is not sure; 0.6 where
+    confidence : 0..1, that of the ranking, less where it rests on an offset that is not sure; 0.6 where
         a rule speaks against it and it was more
     doubts : what the rules found
     nobody : columns of the markers that were left out because they stand still, form another cloud or fit no place
@@ -55,7 +55,7 @@ class Verdict:
 def verdict(seen: Evidence, confidence: float) -> Verdict:
     """Ask every rule; ``confidence`` is what the ranking of the answers says."""
     found = tuple(doubt for rule in RULES if (doubt := rule(seen)) is not None)
-    confidence = sure_of_side(seen, confidence)
+    confidence = sure_of_offset(seen, confidence)
     others = [m for m, c in enumerate(seen.cloud) if c >= 0 and c != seen.taken]
     nobody = sorted({*(int(m) for m in seen.still), *others, *(int(m) for m in seen.far)})
     return Verdict(
