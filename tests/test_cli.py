@@ -272,6 +272,24 @@ def test_every_other_ending_is_one_sentence_too(error, code, says, markers: Path
         log.unlink()
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_full_standard_output_is_named_and_not_the_folder_for_temporary_files(unbuffered: str) -> None:
+    code = (
+        "import argparse, os; from markerscope.app.cli.endings import ended; "
+        "from markerscope.app.cli.output import Terminal; from markerscope.solver.core.request import Outcome\n"
+        "try: Terminal(argparse.Namespace(json=True, quiet=True)).show(Outcome(summary={}, lines=()))\n"
+        "except OSError as error: os._exit(ended(error))"
+    )
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    with Path("/dev/full").open("w") as full:
+        run = subprocess.run(
+            [sys.executable, "-c", code], env=environment, stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert run.returncode == 2
+    assert run.stderr.startswith("the standard output: No space left on device; free some"), run.stderr
+
+
 def test_debug_shows_the_traceback(markers: Path, tmp_path: Path, capsys) -> None:
     words = ["solve", str(markers), "--out", str(tmp_path / "out"), "--debug"]
     assert main(words, Fake(KeyError("hip")).services) == 1

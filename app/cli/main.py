@@ -28,6 +28,7 @@ from markerscope.app.cli.commands import (
 )
 from markerscope.app.cli.dataset import dataset_options
 from markerscope.app.cli.endings import CANCELLED, REFUSED, ended
+from markerscope.app.cli.output import standard_output
 from markerscope.app.cli.synth import synth_options
 from markerscope.app.cli.train import train_options
 from markerscope.solver import __version__
@@ -58,7 +59,8 @@ def main(arguments: Sequence[str] | None = None, services: Services = SERVICES) 
     words = _attach_negative_values(sys.argv[1:] if arguments is None else list(arguments))
     try:
         code = _run(words, services)
-        sys.stdout.flush()  # here, where a reader that has left can still be told from a mistake
+        with standard_output():
+            sys.stdout.flush()  # here, where a reader that has left can still be told from a mistake
         return code
     except KeyboardInterrupt:
         print("Cancelled.", file=sys.stderr)

@@ -7,7 +7,8 @@ import math
 import shutil
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, TextIO
 
@@ -18,6 +19,16 @@ from markerscope.solver.core.request import Outcome
 _REDRAW_EVERY_S = 0.1
 _LINE_EVERY_S = 10.0
 _ESTIMATE_AFTER_S = 1.0
+
+
+@contextmanager
+def standard_output() -> Iterator[None]:
+    """Name the standard output in a failure to write there, which itself names no file."""
+    try:
+        yield
+    except OSError as error:
+        error.filename = error.filename or "the standard output"
+        raise
 
 
 class Terminal:
@@ -36,15 +47,16 @@ class Terminal:
     def show(self, outcome: Outcome) -> None:
         """Print what was found."""
         self._clear()
-        if not self._quiet:
-            for line in outcome.lines:
-                print(shown(line))
-            for warning in outcome.warnings:
-                print(f"Warning: {shown(warning)}")
-        if self._json:
-            said = {"warnings": list(outcome.warnings)} if outcome.warnings else {}
-            print(json_line(said | dict(outcome.summary)))
-        sys.stdout.flush()
+        with standard_output():
+            if not self._quiet:
+                for line in outcome.lines:
+                    print(shown(line))
+                for warning in outcome.warnings:
+                    print(f"Warning: {shown(warning)}")
+            if self._json:
+                said = {"warnings": list(outcome.warnings)} if outcome.warnings else {}
+                print(json_line(said | dict(outcome.summary)))
+            sys.stdout.flush()
 
     def _clear(self) -> None:
         if self._bar is not None:

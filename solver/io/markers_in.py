@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.file_kinds import refuse_other_kind
 from markerscope.solver.core.markers import Markers, UpAxis
 from markerscope.solver.io.c3d import read_c3d
 from markerscope.solver.io.c3d_format import looks_like_c3d
@@ -115,6 +116,8 @@ def list_subjects(path: str | Path) -> tuple[str, ...]:
 def read_raw(path: str | Path) -> RawMarkers:
     """What a file holds, as it stands there: before units, axes, rate and subject are settled."""
     data = read_bytes(path)
+    if not looks_like_c3d(data):
+        refuse_other_kind(data, path, "a marker file (C3D, TRC or a table)")
     if is_c3d(data, path):
         return read_c3d(path, data)
     text = decode(data, path)

@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.file_kinds import refuse_other_kind
 from markerscope.solver.safe_pickle.limits import EXPANSION, SLACK, Budget, Damaged, Forbidden
 from markerscope.solver.safe_pickle.machine import Context, Global, interpret
 from markerscope.solver.safe_pickle.recipes import array_from_bytes
@@ -59,6 +60,7 @@ def load_untrusted(path: str | Path) -> Any:
         ) from None
     if not data:
         raise InputError("the file is empty", path, "export it again")
+    refuse_other_kind(data, path, "a file of arrays or results (npz, npy, pkl or pt)")
     try:
         return _read(data)
     except Forbidden as error:
