@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -157,11 +158,14 @@ def _joins(markers: Markers) -> list[Proposal]:
     present = markers.present.copy()
     spans = sorted(find_gaps(~present), key=lambda span: span.first)  # the gaps of what is lost are what is seen
     owner = {span: span.marker for span in spans}
+    ended = sorted((s for s in spans if s.length >= _SHORTEST), key=lambda s: s.last)
+    ends = [s.last for s in ended]
     found: list[Proposal] = []
     for span in spans:
         if span.first == 0 or span.length < _SHORTEST:
             continue
-        earlier = [s for s in spans if span.first - look <= s.last < span.first and s.length >= _SHORTEST]
+        near = ended[bisect_left(ends, span.first - look) : bisect_left(ends, span.first)]
+        earlier = sorted(near, key=lambda s: (s.first, s.marker))
         away = {s: _away(positions, s, span) for s in earlier}
         if any(s.marker == span.marker and away[s][0] < away[s][1] for s in earlier):
             continue  # goes on in its own track
@@ -174,14 +178,14 @@ def _joins(markers: Markers) -> list[Proposal]:
         )
         if not fits or (len(fits) > 1 and fits[1][0] < 2 * fits[0][0] and owner[fits[1][2]] != owner[fits[0][2]]):
             continue  # none, or two that cannot be told apart
-        distance, _, ended = fits[0]
-        goes_on = owner[ended]
+        distance, _, before = fits[0]
+        goes_on = owner[before]
         owner[span] = goes_on
         present[span.first : span.last + 1, goes_on] = True
         present[span.first : span.last + 1, span.marker] = False
         a, b = markers.labels[goes_on], markers.labels[span.marker]
         said = (
-            f"{a} ends at {markers.time[ended.last]:.3f} s and {b} begins at {markers.time[span.first]:.3f} s, "
+            f"{a} ends at {markers.time[before.last]:.3f} s and {b} begins at {markers.time[span.first]:.3f} s, "
             f"{1000 * distance:.0f} mm from where {a} was going: they look like one marker."
         )
         rival = fits[1][0] if len(fits) > 1 else _FARTHEST_M
