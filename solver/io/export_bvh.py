@@ -11,6 +11,7 @@ import numpy as np
 from markerscope.solver.core.markers import lab_rotation
 from markerscope.solver.io.atomic import write_text_atomic
 from markerscope.solver.io.labels import unique
+from markerscope.solver.io.number_text import number_lines
 
 _CHANNELS = "Zrotation Xrotation Yrotation"
 _END_SITE_CM = 5.0
@@ -52,7 +53,7 @@ def write_bvh(
     place = np.asarray(root_translation, dtype=float) @ R_file_internal.T * 100
     head = ["HIERARCHY", *_hierarchy(names, list(map(int, parents)), np.asarray(offsets, dtype=float) * 100)]
     head += ["MOTION", f"Frames: {len(local)}", f"Frame Time: {1 / rate:.9f}"]
-    rows = [" ".join(f"{value:.6f}" for value in row) for row in np.hstack([place, angles]).tolist()]
+    rows = number_lines(np.hstack([place, angles]), "%.6f", " ")
     write_text_atomic(path, "\n".join(head + rows) + "\n")
 
 

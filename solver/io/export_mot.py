@@ -10,6 +10,7 @@ import numpy as np
 
 from markerscope.solver.io.atomic import write_text_atomic
 from markerscope.solver.io.labels import unique
+from markerscope.solver.io.number_text import number_lines
 
 
 def write_mot(
@@ -51,5 +52,4 @@ def write_mot(
         "endheader",
         "\t".join(labels),
     ]
-    rows = ["\t".join(f"{value:.9g}" for value in row) for row in table.tolist()]
-    write_text_atomic(path, "\n".join(head + rows) + "\n")
+    write_text_atomic(path, "\n".join(head + number_lines(table, "%.9g", "\t")) + "\n")

@@ -14,6 +14,7 @@ from markerscope.solver.io.atomic import write_text_atomic
 from markerscope.solver.io.file_axes import in_file_axes
 from markerscope.solver.io.filled_list import write_filled_list
 from markerscope.solver.io.labels import unique
+from markerscope.solver.io.number_text import number_lines
 
 _KEYS = "DataRate CameraRate NumFrames NumMarkers Units OrigDataRate OrigDataStartFrame OrigNumFrames".split()
 
@@ -54,8 +55,8 @@ def write_trc(
     lost: np.ndarray = ~np.isfinite(positions).all(axis=2)
     cells = np.where(lost[..., None], np.nan, positions * scale).reshape(frames, -1)
     rows = [
-        f"{first + i}\t{time:.9g}\t" + "\t".join(f"{v:.{digits}f}" if v == v else "" for v in row)
-        for i, (time, row) in enumerate(zip(markers.time.tolist(), cells.tolist()))
+        f"{first + i}\t{time:.9g}\t{line}"
+        for i, (time, line) in enumerate(zip(markers.time.tolist(), number_lines(cells, f"%.{digits}f", "\t", lost="")))
     ]
     # OpenSim overlooks an empty cell at the very end unless a tab closes it.
     rows = [row + "\t" if row.endswith("\t") else row for row in rows]
