@@ -19,7 +19,7 @@ from markerscope.solver.core.markers import lab_rotation
 from markerscope.solver.core.skeleton import INDEX, JOINTS, mirror_index
 from markerscope.solver.io.export_angles import angles_long_csv, write_angles
 
-CONVENTIONS = ("opensim", "gait2392", "isb", "visual3d", "plugin-gait")
+CONVENTIONS = ("opensim", "opensim-xzy", "gait2392", "isb", "isb-xzy", "visual3d", "plugin-gait")
 TO_LAB = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 """Turns the rest body (x left, y up, z ahead) to stand in the lab (z up) and face along x."""
 
@@ -389,6 +389,36 @@ def test_an_overhead_swing_ends_where_it_began(convention: str, side: str) -> No
     assert np.abs(values).max() <= 200
 
 
+def raised(step: float = 3.0) -> np.ndarray:
+    """The right arm from hanging at the side sideways to 150 degrees."""
+    angles = np.arange(0, 150, step)
+    rotations = np.tile(np.eye(3), (len(angles), 24, 1, 1))
+    for name, matrix in STANDING.items():
+        rotations[:, INDEX[name]] = matrix
+    rotations[:, INDEX["right_shoulder"]] = [turn(z=-angle) @ HANGING["right_shoulder"] for angle in angles]
+    return at_home(rotations)
+
+
+@pytest.mark.parametrize(("convention", "second"), [("opensim", "opensim-xzy"), ("isb", "isb-xzy")])
+def test_an_order_that_reads_the_shoulder_is_named_where_the_usual_one_cannot(convention: str, second: str) -> None:
+    rotations, body = raised(), square_body(convention)
+    time = np.arange(len(rotations)) / 100
+    found, other = (joint_angles(time, rotations, *body, AngleSettings(name)) for name in (convention, second))  # type: ignore[arg-type]
+    assert found.singular.any() and second in found.hint and f"of {len(time)} frames" in found.hint
+    assert not other.singular.any() and not other.hint
+    # the abduction is the arm's elevation, whatever is singular in the other order
+    mine = [name for name in other.names if name.startswith(("arm", "shoulder")) and name[-1] == "r"]
+    raised_by = -other.degrees[:, other.names.index(mine[0])]
+    assert np.abs(raised_by - np.arange(0, 150, 3.0)).max() < 1e-6
+    assert len(set(found.names) & set(other.names)) == len(found.names) - 6, "another order has names of its own"
+
+
+def test_no_order_is_named_where_all_angles_can_be_told() -> None:
+    rotations = raised()[:25]
+    found = joint_angles(np.arange(25) / 100, rotations, *square_body("opensim"), AngleSettings())
+    assert not found.singular.any() and not found.hint
+
+
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_every_reading_lies_within_half_a_turn_of_the_joints_range(convention: str) -> None:
     """Random turns of every joint, in random order: no angle but a heading depends on the frames before."""
@@ -445,7 +475,7 @@ def test_jumps_of_the_reading_are_flagged() -> None:
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_the_anatomical_position_is_zero(convention: str) -> None:
     carrying = np.degrees(np.arctan(0.03 / 0.25))  # ISB's forearm ends at the ulna, 30 mm beside the wrist's middle
-    offset = {"elbow_carrying": carrying, "wrist_ulnar_deviation": -carrying} if convention == "isb" else {}
+    offset = {"elbow_carrying": carrying, "wrist_ulnar_deviation": -carrying} if convention.startswith("isb") else {}
     for column, value in angles_of(convention).items():
         if np.isfinite(value):
             expected = offset.get(column[:-2], 0.0)

@@ -18,7 +18,7 @@ from markerscope.solver.core.markers import lab_rotation
 from markerscope.solver.core.rotations import exp_so3
 from markerscope.solver.core.skeleton import INDEX, JOINTS, PARENTS
 
-Convention = Literal["opensim", "isb", "gait2392", "visual3d", "plugin-gait"]
+Convention = Literal["opensim", "opensim-xzy", "isb", "isb-xzy", "gait2392", "visual3d", "plugin-gait"]
 
 _PAIRS = {
     "pelvis": ("", "pelvis"),
@@ -67,8 +67,18 @@ class AngleSettings:
 
 @cache
 def conventions() -> dict[str, Any]:
-    """Every convention, as ``resources/angle_conventions.toml`` has it."""
-    return tomllib.loads(resource("angle_conventions.toml").read_text(encoding="utf-8"))
+    """Every convention, as ``resources/angle_conventions.toml`` has it, with what it takes over from another."""
+    told = tomllib.loads(resource("angle_conventions.toml").read_text(encoding="utf-8"))
+    return {name: _completed(row, told) for name, row in told.items()}
+
+
+def _completed(row: Mapping[str, Any], told: Mapping[str, Any]) -> dict[str, Any]:
+    """A convention with what it does not say itself as the one has it that it is ``like``."""
+    if "like" not in row:
+        return dict(row)
+    other = told[row["like"]]
+    kept = {name: value for name, value in other.items() if name != "second"}
+    return {**kept, **row, "joints": {**other["joints"], **row["joints"]}}
 
 
 def joint_angles(
@@ -133,6 +143,35 @@ def read_angles(time: np.ndarray, segments: Mapping[str, np.ndarray], settings: 
         sequence=tuple(column.sequence for column in columns),
         positive=tuple(column.positive for column in columns),
         zero_pose=convention["zero_pose"],
+        hint=_other_order(flags.astype(bool), columns, segments, convention),
+    )
+
+
+def _other_order(
+    flags: np.ndarray, columns: list[_Column], segments: Mapping[str, np.ndarray], convention: Mapping[str, Any]
+) -> str:
+    """Which convention to take where an arm passes through the singularity of this one's sequence; "" for none.
+
+    Parameters
+    ----------
+    flags : (T, A) True where an angle cannot be told
+    columns : the A angles
+    """
+    arms = [i for i, column in enumerate(columns) if column.far.endswith("upper_arm")]
+    lost = int(flags[:, arms].any(axis=1).sum()) if arms else 0
+    if not lost or "second" not in convention:
+        return ""
+    second: Convention = convention["second"]
+    other = read_angles(np.zeros(len(flags)), segments, AngleSettings(second))
+    theirs = [i for i, column in enumerate(_columns(second)) if column.far.endswith("upper_arm")]
+    left = int(other.singular[:, theirs].any(axis=1).sum())
+    if left >= lost:
+        return ""
+    sequence = {columns[i].sequence for i in arms}.pop()
+    return (
+        f"The shoulder's sequence {sequence} is singular in {lost} of {len(flags)} frames, where its first and last "
+        f"angle are left empty; the convention {second} reads the shoulder as {other.sequence[theirs[0]]} and leaves "
+        f"{left if left else 'none'} empty."
     )
 
 

@@ -28,6 +28,7 @@ class JointAngles:
     zero : "recorded", or "neutral" where angles are relative to a neutral pose
     neutral_pose : what the neutral pose was read off, in words
     recorded_zero_pose : what they were counted from before that
+    hint : which convention reads more of a shoulder that this one's sequence cannot tell; "" where there is no need
     """
 
     time: np.ndarray
@@ -43,6 +44,7 @@ class JointAngles:
     zero: Literal["recorded", "neutral"] = "recorded"
     neutral_pose: str = ""
     recorded_zero_pose: str = ""
+    hint: str = ""
 
     @property
     def as_recorded(self) -> JointAngles:

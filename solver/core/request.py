@@ -19,7 +19,7 @@ RECORDED = "recorded"
 """What ``--neutral`` takes for the convention's own zero."""
 _SPAN = re.compile(r"[-+.\deE]*:[-+.\deE]*")
 LandmarkPull = Literal["earned", "off"]
-Convention = Literal["opensim", "isb", "gait2392", "visual3d", "plugin-gait"]
+Convention = Literal["opensim", "opensim-xzy", "isb", "isb-xzy", "gait2392", "visual3d", "plugin-gait"]
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,7 @@ def write_angles(
         "zero": angles.zero,
         "zero_pose": angles.zero_pose,
         **({"neutral_pose": angles.neutral_pose} if relative else {}),
+        **({"other_order": angles.hint} if angles.hint else {}),
         "units": {"time": "s", "angles": "degrees"},
         "angles": [
             {

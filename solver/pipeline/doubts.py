@@ -5,14 +5,15 @@ from __future__ import annotations
 from markerscope.solver.fit.doubts.doubt import named, plural
 from markerscope.solver.fit.doubts.far import SUSPECT_M
 from markerscope.solver.pipeline.cleaning import notes_of
-from markerscope.solver.pipeline.names import CHECK, CLEAN, FIT, MARKERS, NEUTRAL, PRIOR, SYNC
+from markerscope.solver.pipeline.names import ANGLES, CHECK, CLEAN, FIT, MARKERS, NEUTRAL, PRIOR, SYNC
 from markerscope.solver.pipeline.stage import GraphRun
 
 
 def assumptions(graph: GraphRun) -> tuple[str, ...]:
-    """What was assumed while the files were read, and which markers deserve a look."""
+    """What was assumed while the files were read, which markers deserve a look, and how to read more of an angle."""
     read = (*graph[MARKERS].notes, *notes_of(graph[CLEAN]), *graph[PRIOR].notes, *graph[NEUTRAL].notes)
-    return (*read, *_suspects(graph))
+    hint = graph[ANGLES].hint
+    return (*read, *_suspects(graph), *((hint,) if hint else ()))
 
 
 def doubts(graph: GraphRun) -> tuple[str, ...]:

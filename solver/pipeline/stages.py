@@ -93,7 +93,8 @@ def said_neutral(neutral: Neutral) -> str:
 
 
 def _said_angles(angles: JointAngles) -> str:
-    return f"{len(angles.names)} angles ({angles.title})"
+    said = f"{len(angles.names)} angles ({angles.title})"
+    return f"{said}; {angles.hint}" if angles.hint else said
 
 
 FITTED_TO = (*fitting.FittedTo.__annotations__,)
@@ -175,7 +176,7 @@ GRAPH = (
     ),
     Stage(
         "angles",
-        4,
+        5,
         AngleSettings,
         ("fit", "neutral", "body_file"),
         fitting.read_angles,
