@@ -26,7 +26,7 @@ DECISIONS = {
     "sync": ("offset", "rate_ratio"),
     "segment": ("threshold", "groups", "merges", "splits", "moves", "left_out"),
     "localize": ("part_of_cloud",),
-    "fit": ("candidate", "pinned", "refused"),
+    "fit": ("candidate", "pinned", "refused", "second"),
     "neutral": ("start", "stop"),
 }
 """Settings that are decided for one recording."""

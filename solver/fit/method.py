@@ -27,6 +27,7 @@ from markerscope.solver.fit.problem import Problem
 from markerscope.solver.fit.pull.stage import to_landmarks
 from markerscope.solver.fit.refine import every_frame
 from markerscope.solver.fit.results import Candidate, FittedMotion, Localization, Orientation, Steps
+from markerscope.solver.fit.second.stage import search_limbs
 from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
 from markerscope.solver.fit.sifting import loose_share, strays, without_place
 from markerscope.solver.fit.state import Camera, Observations, State, Surface, Weights
@@ -261,9 +262,11 @@ def fit(
     lost = np.isin(np.arange(seen.markers.shape[1]), theirs)[:, None]
     kept = replace(seen, markers=np.where(lost, np.nan, seen.markers))
     drawn = to_landmarks(body, kept, landmarks, found.markers, frames, state, surface, weights, own)
-    pose = every_frame(body, used, landmarks, frames, drawn.state, drawn.surface, weights, progress)
-    motion = fitted_motion(body, seen, found, ranked, settings, drawn.state, pose, time)
-    return replace(motion, pull=drawn.pull)
+    around = (body, used.at(frames), landmarks)
+    searched = search_limbs(*around, drawn.state, drawn.surface, weights, drawn.by, settings.second)
+    pose = every_frame(body, used, landmarks, frames, searched.state, searched.surface, weights, progress)
+    motion = fitted_motion(body, seen, found, ranked, settings, searched.state, pose, time)
+    return replace(motion, pull=drawn.pull, second=searched.others)
 
 
 def in_use(seen: Observations, found: Localization, ranked: Orientation) -> Observations:

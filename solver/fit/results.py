@@ -8,6 +8,7 @@ import numpy as np
 
 from markerscope.solver.core.camera import CameraResult
 from markerscope.solver.fit.pull.results import LandmarkPull
+from markerscope.solver.fit.second.results import LimbAnswer
 from markerscope.solver.fit.state import no_bias
 
 
@@ -162,6 +163,7 @@ class FittedMotion:
         so
     settled : (T,) True where the frame's iteration came to that, None where it was not iterated so
     pull : which markers were drawn to which bony landmarks; None where the method knows no such thing
+    second : second answers for single limbs, that cost hardly more
     """
 
     time: np.ndarray
@@ -180,3 +182,4 @@ class FittedMotion:
     settled_deg: float = np.nan
     settled: np.ndarray | None = None
     pull: LandmarkPull | None = None
+    second: tuple[LimbAnswer, ...] = ()

@@ -9,6 +9,7 @@ import numpy as np
 
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.fit.pull.by_hand import Pair, check_pairs
+from markerscope.solver.fit.second.results import LIMBS
 from markerscope.solver.fit.state import Weights
 
 
@@ -101,6 +102,7 @@ class FitSettings:
     landmark_pull : draw markers to palpable bony landmarks where the layout has ``earned`` it, or ``off``
     pinned : markers by column that sit on a bony landmark, by hand
     refused : pairs that are not to be, by hand; the landmark "" stands for all of them
+    second : limbs whose second answer is to be taken, by hand
     """
 
     candidate: int | None = None
@@ -108,11 +110,15 @@ class FitSettings:
     landmark_pull: Literal["earned", "off"] = "earned"
     pinned: tuple[Pair, ...] = ()
     refused: tuple[Pair, ...] = ()
+    second: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what cannot work."""
         _positive(self, "video_share")
         check_pairs(self.pinned, self.refused)
+        for limb in self.second:
+            if limb not in LIMBS:
+                raise InputError(f'"{limb}" is no limb', "the setting second", f"use some of {', '.join(LIMBS)}")
 
     def weights(self) -> Weights:
         """The same as weights of the fit."""

@@ -206,5 +206,6 @@ def check_result(
         far=orient.far,
         mirror=orient.mirror,
         span=greatest_distance(fit.placed[len(fit.time) // 2]),
+        second=fit.second,
     )
     return verdict(evidence, fit.confidence)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from markerscope.solver.fit.second.results import LimbAnswer
+
 CAP = 0.6
 """A result that a rule speaks against is said with no more confidence than this."""
 _LISTED = 8
@@ -18,7 +20,7 @@ class Doubt:
 
     Attributes
     ----------
-    kind : which rule, one of ``rules.RULES``' names
+    kind : which rule, one of ``rules.RULES``' names, or "second answer"
     sentence : what, how much, and what to do
     markers : columns of the markers it is about; empty where it is about the whole
     value, limit : the figure and what it should not pass, in the unit that the sentence has; NaN where there is none
@@ -57,6 +59,7 @@ class Evidence:
     far : columns of markers that fit no place on the body
     mirror : times the energy that the answer costs of what it does with the video mirrored; NaN where not tried
     span : m, greatest distance between two markers in use; NaN where unknown
+    second : second answers for single limbs
     said : what the ranking of the answers itself has to say
     """
 
@@ -80,6 +83,7 @@ class Evidence:
     mirror: float = float("nan")
     span: float = float("nan")
     sync_rival: float = float("nan")
+    second: tuple[LimbAnswer, ...] = ()
     said: tuple[str, ...] = ()
 
 

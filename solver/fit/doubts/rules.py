@@ -14,6 +14,7 @@ from markerscope.solver.fit.doubts.misfit import off_the_skin, off_their_places
 from markerscope.solver.fit.doubts.offset import lone_limb, sure_of_offset
 from markerscope.solver.fit.doubts.picture import off_the_picture
 from markerscope.solver.fit.doubts.rigid import one_group
+from markerscope.solver.fit.doubts.second import second_answers
 from markerscope.solver.fit.doubts.still import still
 from markerscope.solver.fit.doubts.turn import turning_camera
 
@@ -41,7 +42,7 @@ class Verdict:
     ----------
     confidence : 0..1, that of the ranking, less where it rests on an offset that is not sure; 0.6 where
         a rule speaks against it and it was more
-    doubts : what the rules found
+    doubts : what the rules found, then the limbs that have a second answer, which leave the confidence in the whole
     nobody : columns of the markers that were left out because they stand still, form another cloud or fit no place
     suspect : columns of the markers in use that are over 20 mm from their place, most of them on a wrong bone
     """
@@ -60,7 +61,7 @@ def verdict(seen: Evidence, confidence: float) -> Verdict:
     nobody = sorted({*(int(m) for m in seen.still), *others, *(int(m) for m in seen.far)})
     return Verdict(
         min(confidence, CAP) if found else confidence,
-        found,
+        (*found, *second_answers(seen)),
         tuple(nobody),
         tuple(int(m) for m in suspects(seen.residual)),
     )

@@ -32,11 +32,12 @@ _NAMED = 0.05
 
 @dataclass(frozen=True)
 class Drawn:
-    """The keyframes' fit after the pull, or as it was, and what became of the markers (U)."""
+    """The keyframes' fit after the pull, or as it was, what became of the markers (U), and the energy's last pull."""
 
     state: State
     surface: Surface
     pull: LandmarkPull
+    by: Pull | None = None
 
 
 def draw(
@@ -69,7 +70,7 @@ def draw(
         return Drawn(state, surface, nothing_drawn("not earned", log_ratio, len(before)))
     share = share if earned else 0.0
     now, skin, distance, believed = state, surface, before, SPREADS[0]
-    chance = np.zeros_like(before)
+    chance, pull = np.zeros_like(before), None
     for least in SPREADS:
         for _ in range(_ROUNDS):
             spread = max(least, believed)
@@ -87,7 +88,7 @@ def draw(
         return draw(body, seen, landmarks, state, surface, weights, fixed, fixed)
     found = _said(targets, chance, before, distance)
     pulled = LandmarkPull("earned" if earned else "by hand", log_ratio, *found, spread=believed)
-    return Drawn(now, skin, pulled)
+    return Drawn(now, skin, pulled, pull)
 
 
 def _distances(body: Body, state: State, weights: Weights, allowed: np.ndarray) -> tuple[Targets, np.ndarray]:
