@@ -15,7 +15,7 @@ from markerscope.solver.fit.doubts.second import second_answers
 from markerscope.solver.fit.kinematics import forward
 from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.problem import Problem
-from markerscope.solver.fit.pull.problem import Pull, PulledProblem
+from markerscope.solver.fit.pull.term import Pull
 from markerscope.solver.fit.pull.targets import targets_of
 from markerscope.solver.fit.second.limb import Limb
 from markerscope.solver.fit.second.results import LIMBS
@@ -73,7 +73,7 @@ def test_a_limbs_cost_is_what_the_whole_fit_costs_more_or_less(free_body: Body, 
     turn = exp_so3(rng.normal(0, 0.15, (3, 3, 3)))
     guesses = limb.placed_again(limb.at(np.concatenate([np.eye(3) + np.zeros((1, 3, 3, 3)), turn])))
     cost = limb.linearised(guesses, WEIGHTS.marker, WEIGHTS.marker_kernel, slopes=False)[0] / FRAMES
-    problem = PulledProblem(*one.around, pull)  # type: ignore[arg-type]
+    problem = Problem(free_body, replace(one.scene.seen, further=(pull,)), one.scene.landmarks)  # type: ignore[arg-type]
     found = replace(minima_like(limb, guesses), cost=cost)
     totals = []
     for row in range(4):

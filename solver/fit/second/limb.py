@@ -18,7 +18,7 @@ from markerscope.solver.core.skeleton import descendants
 from markerscope.solver.fit import anatomical
 from markerscope.solver.fit.kinematics import forward
 from markerscope.solver.fit.placement import Skin
-from markerscope.solver.fit.pull.problem import Pull
+from markerscope.solver.fit.pull.term import Pull
 from markerscope.solver.fit.state import FREE, Observations, State, Weights
 
 

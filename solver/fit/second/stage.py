@@ -12,7 +12,7 @@ from markerscope.solver.fit.bundle import reattach
 from markerscope.solver.fit.kinematics import Points
 from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.problem import Problem
-from markerscope.solver.fit.pull.problem import Pull, PulledProblem
+from markerscope.solver.fit.pull.term import Pull
 from markerscope.solver.fit.second.limb import Limb
 from markerscope.solver.fit.second.results import LIMBS, LimbAnswer
 from markerscope.solver.fit.second.search import Minima, minima
@@ -60,7 +60,8 @@ def search_limbs(
     pull : what drew markers to landmarks in it
     wanted : limbs whose second answer is to be taken though it costs more
     """
-    problem = Problem(body, seen, landmarks) if pull is None else PulledProblem(body, seen, landmarks, pull)
+    known = seen if pull is None else replace(seen, further=(*seen.further, pull))
+    problem = Problem(body, known, landmarks)
     some = np.unique(np.linspace(0, len(seen.markers) - 1, _FRAMES).round().astype(int))
     skin = Skin(body, state.pose.betas)
     told: list[LimbAnswer] = []
