@@ -15,8 +15,8 @@ from markerscope.solver.fit.doubts.second import second_answers
 from markerscope.solver.fit.kinematics import forward
 from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.problem import Problem
-from markerscope.solver.fit.pull.term import Pull
 from markerscope.solver.fit.pull.targets import targets_of
+from markerscope.solver.fit.pull.term import Pull
 from markerscope.solver.fit.second.limb import Limb
 from markerscope.solver.fit.second.results import LIMBS
 from markerscope.solver.fit.second.search import minima
