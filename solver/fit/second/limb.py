@@ -205,10 +205,10 @@ class Limb:
         own = np.einsum("snm,snmab,snmac->smbc", info, blended, blended, optimize=True)
         own += self.once * normal[..., :, None] * normal[..., None, :] / weights.offset_spread**2
         own += np.eye(3) / weights.slide**2
-        np.add.at(own, (slice(None), at), strength[:, None, None] * np.eye(3))
+        np.add.at(own, (slice(None), at), strength[:, None, None] * np.eye(3))  # type: ignore[arg-type]
         slope = np.einsum("snm,snmab,snma->smb", info, blended, residual, optimize=True)
         slope += self.once * normal * height[..., None] / weights.offset_spread**2
-        np.add.at(slope, (slice(None), at), strength[:, None] * gap)
+        np.add.at(slope, (slice(None), at), strength[:, None] * gap)  # type: ignore[arg-type]
         for m in range(place.shape[1]):
             q = slice(p + 3 * m, p + 3 * m + 3)
             h[:, q, q] = own[:, m]
