@@ -15,6 +15,7 @@ from markerscope.app.models.fields import Setting, setting_of, title
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.request import Method
 from markerscope.solver.fit.counting import candidate_number
+from markerscope.solver.pipeline.cleaning import BY_FRAME
 from markerscope.solver.pipeline.methods import graph_of
 from markerscope.solver.pipeline.methods import with_method as solved_by
 from markerscope.solver.pipeline.session import InputFile, Session
@@ -22,7 +23,7 @@ from markerscope.solver.pipeline.settings import UNSET, overlay, to_table, witho
 
 DECISIONS = {
     "markers": ("start", "stop"),
-    "clean": ("keep", "swaps", "joins"),
+    "clean": BY_FRAME,
     "sync": ("offset", "rate_ratio"),
     "segment": ("threshold", "groups", "merges", "splits", "moves", "left_out"),
     "localize": ("part_of_cloud",),

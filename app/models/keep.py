@@ -13,6 +13,7 @@ from typing import Any
 
 from markerscope.app.models.edits import Edit
 from markerscope.solver.fit.counting import candidate_number
+from markerscope.solver.pipeline.cleaning import BY_FRAME
 from markerscope.solver.pipeline.methods import graph_of
 from markerscope.solver.pipeline.session import Session
 from markerscope.solver.pipeline.source import Source
@@ -20,7 +21,6 @@ from markerscope.solver.pipeline.stage import stage_keys
 from markerscope.solver.pipeline.stages import SOURCES
 
 _BY_COLUMN = ("merges", "splits", "moves", "left_out")
-_BY_FRAME = ("keep", "swaps", "joins")
 
 
 def kept_decisions(before: Session, edit: Edit) -> Edit:
@@ -32,7 +32,7 @@ def kept_decisions(before: Session, edit: Edit) -> Edit:
     for stage, names, moved, said in (
         ("segment", _BY_COLUMN, columns, "groups made by hand are as the cut makes them"),
         ("localize", ("part_of_cloud",), columns, "the cloud to solve is chosen by the program again"),
-        ("clean", _BY_FRAME, columns or _start(before) != _start(after), "edits of tracks are taken back"),
+        ("clean", BY_FRAME, columns or _start(before) != _start(after), "edits of tracks are taken back"),
     ):
         table = after.edits.get(stage, {})
         kept = {name: value for name, value in table.items() if name not in names}

@@ -7,8 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
+from markerscope.solver.cleaning.fill_by_hand import PlacedFill, parts_by_hand, put_in
 from markerscope.solver.cleaning.gaps import Fill, FillMethod, FillSettings, find_gaps
 from markerscope.solver.cleaning.outliers import OutlierSettings, find_outliers
+from markerscope.solver.cleaning.request import Method
 from markerscope.solver.cleaning.swaps import Proposal, find_proposals
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.markers import Markers
@@ -26,6 +28,8 @@ class CleanSettings:
     fill : how
     tracks : look for tracks that exchanged or broke
     keep : (marker, first frame, last frame), samples that are not cut whatever they look like
+    fills : (marker, first frame, last frame, method), gaps that are filled so in any case
+    placed : gaps for which places are given
     """
 
     outliers: OutlierSettings = field(default_factory=OutlierSettings)
@@ -33,6 +37,8 @@ class CleanSettings:
     fill: FillSettings = field(default_factory=FillSettings)
     tracks: bool = True
     keep: tuple[tuple[int, int, int], ...] = ()
+    fills: tuple[tuple[int, int, int, Method], ...] = ()
+    placed: tuple[PlacedFill, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +91,13 @@ class Cleaned:
     @cached_property
     def filled(self) -> np.ndarray:
         """(T, M) True where this cleaning filled a sample; those that the file had as filled are not among them."""
-        mask = np.zeros(self.markers.positions.shape[:2], dtype=bool)
-        for span in self.fills:
-            mask[span.first : span.last + 1, span.marker] = True
-        return mask
+        return _mask(self.fills, self.markers.positions.shape[:2])
+
+    @cached_property
+    def decided(self) -> Markers:
+        """What was measured and not cut, with the gaps that were filled by hand, flagged as filled: what is exported."""
+        others = tuple(fill for fill in self.fills if not fill.by_hand)
+        return put_back(replace(self, fills=others), outliers=False) if others else self.markers
 
 
 def clean(
@@ -134,6 +143,12 @@ def clean(
         result = (fill_by or fill)(without.positions, without.rate, settings.fill)
         cleaned = replace(without, positions=result.positions, filled=(already & ~out) | result.filled)
         fills, notes = result.fills, result.notes
+    if settings.fills or settings.placed:
+        progress(0.8, "filling gaps as decided by hand")
+        parts, left = parts_by_hand(without, settings.fills, settings.placed)
+        positions, fills = put_in(cleaned.positions, fills, parts)
+        cleaned = replace(cleaned, positions=positions, filled=(already & ~out) | _mask(fills, out.shape))
+        notes = (*notes, *left)
     progress(1.0, "clean")
     return Cleaned(cleaned, cut, fills, proposals, (*_notes(cleaned, cut, fills, proposals), *notes))
 
@@ -155,6 +170,13 @@ def put_back(cleaned: Cleaned, outliers: bool = True, fills: bool = True) -> Mar
     return replace(markers, positions=positions, filled=filled)
 
 
+def _mask(fills: tuple[Fill, ...], shape: tuple[int, ...]) -> np.ndarray:
+    mask = np.zeros(shape, dtype=bool)
+    for span in fills:
+        mask[span.first : span.last + 1, span.marker] = True
+    return mask
+
+
 def _without(markers: Markers, out: np.ndarray) -> Markers:
     positions = markers.positions.copy()
     positions[out] = np.nan
@@ -170,7 +192,8 @@ def _notes(markers: Markers, cut: Cut, fills: tuple[Fill, ...], proposals: tuple
     if fills:
         samples = sum(fill.length for fill in fills)
         error = sum(fill.error * fill.length for fill in fills) / samples
-        said.append(f"{len(fills)} gaps ({samples} samples) were filled; expected error {1000 * error:.1f} mm.")
+        known = f"{1000 * error:.1f} mm" if np.isfinite(error) else "not known"
+        said.append(f"{len(fills)} gaps ({samples} samples) were filled; expected error {known}.")
     if left:
         said.append(f"{len(left)} gaps ({sum(gap.length for gap in left)} samples) are left as they were.")
     if never:

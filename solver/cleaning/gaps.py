@@ -35,6 +35,7 @@ class Fill:
     method : what filled it; the default falls back to others where it cannot be used
     confidence : 0..1, falls as ``error`` rises
     error : m, distance from the truth to be expected on average over the span
+    by_hand : whether the user asked for it
     """
 
     marker: int
@@ -43,6 +44,7 @@ class Fill:
     method: str
     confidence: float
     error: float
+    by_hand: bool = False
 
     @property
     def length(self) -> int:
@@ -78,12 +80,14 @@ class FillSettings:
     max_gap : s, longer gaps stay; None fills whatever can be told
     min_confidence : 0..1, gaps whose filling would be surer than this are filled
     neighbours : markers that a gap is filled from, at most, with the methods that use several
+    only : the one gap that is wanted; None for all
     """
 
     method: Method = "regression"
     max_gap: float | None = 5.0
     min_confidence: float = 0.2
     neighbours: int = 10
+    only: Gap | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot work."""
@@ -124,9 +128,9 @@ def find_gaps(present: np.ndarray) -> list[Gap]:
 
 
 def gaps_to_fill(present: np.ndarray, rate: float, settings: FillSettings) -> list[Gap]:
-    """The gaps that are not too long."""
+    """The gaps that are not too long, and wanted."""
     longest = np.inf if settings.max_gap is None else settings.max_gap * rate + 1e-6
-    return [gap for gap in find_gaps(present) if gap.length <= longest]
+    return [gap for gap in find_gaps(present) if gap.length <= longest and settings.only in (None, gap)]
 
 
 def together(positions: np.ndarray, parts: list[tuple[Fill, np.ndarray]], settings: FillSettings) -> Filled:

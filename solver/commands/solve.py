@@ -20,11 +20,12 @@ from markerscope.solver.fit.pull.results import summary as summary_of_pull
 from markerscope.solver.fit.results import Candidate
 from markerscope.solver.io.camera import camera_file
 from markerscope.solver.io.output_folder import remove_if_empty
+from markerscope.solver.pipeline.cleaning import BY_FRAME
 from markerscope.solver.pipeline.doubts import assumptions, doubts
 from markerscope.solver.pipeline.in_force import write_answers
 from markerscope.solver.pipeline.look import look_at
 from markerscope.solver.pipeline.methods import GRAPHS, graph_of, spelt_out, with_method
-from markerscope.solver.pipeline.names import CHECK, FIT, MARKERS, ORIENT, SURFACE, SYNC
+from markerscope.solver.pipeline.names import CHECK, CLEAN, FIT, ORIENT, SURFACE, SYNC
 from markerscope.solver.pipeline.session import (
     InputFile,
     RunSettings,
@@ -124,7 +125,7 @@ def session_of(request: SolveRequest) -> Session:
 def _require_frames(before: Session, after: Session) -> None:
     """Refuse where edits of tracks, which name frames of the range, would come to mean others."""
     starts = {session.stage_settings(graph_of(session))["markers"].start for session in (before, after)}
-    if len(starts) > 1 and {"keep", "swaps", "joins"} & set(after.edits.get("clean", {})):
+    if len(starts) > 1 and {*BY_FRAME} & set(after.edits.get("clean", {})):
         raise InputError(
             "counts frames from the start of the range, which would be another",
             f"{after.folder / FILE_NAME}, edits.clean",
@@ -276,7 +277,7 @@ def _tidy(session: Session) -> Iterator[None]:
 
 def _outcome(session: Session, graph: GraphRun, not_kept: tuple[str, ...] = ()) -> SolveOutcome:
     motion, ranked, sync, surface = graph[FIT], graph[ORIENT], graph[SYNC], graph[SURFACE]
-    markers, found = graph[MARKERS], graph[CHECK]
+    markers, found = graph[CLEAN].markers, graph[CHECK]
     best = ranked.candidates[motion.chosen]
     summary = {
         "out": str(session.folder),

@@ -66,13 +66,13 @@ def site_of(request: TrainRequest, progress: Progress) -> Site:
         body = Body.load()
         return Site(named_layout(body, request.layout), body, own=False)  # type: ignore[arg-type]
     from markerscope.solver.body.bones import with_bone_lengths
-    from markerscope.solver.pipeline.names import FIT, MARKERS
+    from markerscope.solver.pipeline.names import CLEAN, FIT
 
     session, run = _solved(request.session, FIT, progress)
     body, fitted = _body(session), run[FIT]
     grown = with_bone_lengths(body)
     person = replace(body, template=grown.surface(fitted.betas), joint_template=grown.joints(fitted.betas), _torch={})
-    return Site(session_layout(grown, fitted, run[MARKERS].labels), person, own=True)
+    return Site(session_layout(grown, fitted, run[CLEAN].markers.labels), person, own=True)
 
 
 def ground_of(request: TrainRequest, progress: Progress) -> tuple[Ground, dict[str, Any], tuple[str, ...]]:
@@ -87,12 +87,12 @@ def ground_of(request: TrainRequest, progress: Progress) -> tuple[Ground, dict[s
     from markerscope.solver.fit.method import chosen_row
     from markerscope.solver.neural.layout_free.agnostic_fit import marked
     from markerscope.solver.pipeline.methods import graph_of
-    from markerscope.solver.pipeline.names import LOCALIZE, MARKERS, ORIENT
+    from markerscope.solver.pipeline.names import CLEAN, LOCALIZE, ORIENT
 
     session, run = _solved(request.session, ORIENT, progress)
     fit = session.stage_settings(graph_of(session))["fit"]
     candidate = run[ORIENT].candidates[chosen_row(run[ORIENT], fit)]
-    body, used = _body(session), run[MARKERS].labels
+    body, used = _body(session), run[CLEAN].markers.labels
     labels = tuple(used[int(i)] for i in run[LOCALIZE].markers)
     person = marked(with_bone_lengths(body), candidate)
     return Ground(body, person=person), places_of(body, candidate.vertex), labels

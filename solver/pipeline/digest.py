@@ -13,6 +13,8 @@ import numpy as np
 
 from markerscope.solver.core.errors import InputError
 
+CHANGES_NOTHING = {"changes": "nothing"}
+"""Metadata of a field of settings that no result depends on: it is kept with the session, and no key holds it."""
 KEY_LENGTH = 32
 """Hexadecimal digits of a result's key: 128 bits, short enough for every file system."""
 
@@ -35,7 +37,8 @@ def canonical(value: Any) -> Any:
         content = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
         return ["$array", value.dtype.str, list(value.shape), content]
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: canonical(getattr(value, field.name)) for field in dataclasses.fields(value)}
+        own = [field for field in dataclasses.fields(value) if field.metadata.get("changes") != "nothing"]
+        return {field.name: canonical(getattr(value, field.name)) for field in own}
     if isinstance(value, Mapping):
         return {str(key): canonical(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

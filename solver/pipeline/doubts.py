@@ -23,7 +23,7 @@ def doubts(graph: GraphRun) -> tuple[str, ...]:
 
 
 def _suspects(graph: GraphRun) -> tuple[str, ...]:
-    suspect, labels = graph[CHECK].suspect, graph[MARKERS].labels
+    suspect, labels = graph[CHECK].suspect, graph[CLEAN].markers.labels
     if not suspect:
         return ()
     return (

@@ -105,7 +105,7 @@ BODY = (EMBEDDED,)
 GRAPH = (
     Stage("markers", 1, MarkerSettings, ("marker_file",), inputs.read_markers, Markers, _said_markers, cost=0.5),
     Stage(
-        "clean", 2, CleaningSettings, ("markers",), cleaning.clean_markers, Cleaned, cleaning.said_cleaning, cost=0.5
+        "clean", 3, CleaningSettings, ("markers",), cleaning.clean_markers, Cleaned, cleaning.said_cleaning, cost=0.5
     ),
     Stage(
         "landmarks",

@@ -155,7 +155,7 @@ def _write(
     body = load_body(body_file.path if body_file else None)
     if body_file is not None and body_file.digest and file_digest(body_file.path) != body_file.digest:
         raise changed(body_file.path)
-    named = labelled(markers, motion)
+    named = labelled(graph[CLEAN].decided, motion)
     not_kept: tuple[str, ...] = ()
     if "angles" in formats or "angles_long" in formats:  # the long form, too, has its convention beside it
         write_angles(folder, angles, about, evidence(angles.convention, motion.marker_joint))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -83,7 +83,7 @@ def fill_regression(positions: np.ndarray, rate: float, settings: FillSettings) 
     """
     present = np.isfinite(positions).all(axis=2)
     near = neighbours_of(positions)
-    gaps = gaps_to_fill(present, rate, settings)
+    gaps = gaps_to_fill(present, rate, replace(settings, only=None))  # a wanted one may be filled from the others
     start: Parts = {}
     for gap in gaps:
         part = rigid_part(positions, present, near, gap, settings.neighbours) or spline_part(positions, present, gap)
@@ -96,7 +96,8 @@ def fill_regression(positions: np.ndarray, rate: float, settings: FillSettings) 
             whole[gap.first : gap.last + 1, gap.marker] = values
         scene = _Scene(whole, present, np.isfinite(whole).all(axis=2), near)
         parts = start | _round(scene, gaps, settings.neighbours, judged=not left)
-    return together(positions, list(parts.values()), settings)
+    wanted = [part for gap, part in parts.items() if settings.only in (None, gap)]
+    return together(positions, wanted, settings)
 
 
 def _round(scene: _Scene, gaps: list[Gap], most: int, judged: bool) -> Parts:
