@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from markerscope.app.actions.action import Action, Asks, first, needs
-from markerscope.app.models import clean_edits
+from markerscope.app.actions.action import Action, ActionWith, Asks, first, needs, or_without
+from markerscope.app.actions.track_actions import no_tracks, work_of
+from markerscope.app.models import clean_edits, track_edits
 from markerscope.app.models.workbench import Said, Workbench
 from markerscope.solver.cleaning.swaps import Proposal
 from markerscope.solver.core.errors import InputError
@@ -14,23 +17,38 @@ from markerscope.solver.pipeline.names import CLEAN, MARKERS
 _needs_clean = needs("clean", "the markers have not been cleaned")
 
 
+def _open(bench: Workbench) -> tuple[Proposal, ...]:
+    """Proposals that are neither accepted nor rejected."""
+    work = work_of(bench)
+    return tuple(p for p in work.proposals if not work.accepted(p))
+
+
 def _no_proposal(bench: Workbench) -> str:
-    return "" if bench.board.current[CLEAN].proposals else "no edit of tracks is proposed"
+    return "" if _open(bench) else "no edit of tracks is proposed"
 
 
-def _next(bench: Workbench, asks: Asks) -> None:
-    """Go to the next proposal after the clock's frame, and select its markers."""
-    proposals = sorted(bench.board.current[CLEAN].proposals, key=lambda proposal: proposal.frame)
-    here = bench.clock.marker_frame or 0
-    chosen = next((p for p in proposals if p.frame > here), proposals[0])
-    bench.selection.select_markers(chosen.markers)
-    bench.clock.seek_marker_frame(chosen.frame)
-    bench.say(Said("note", chosen.sentence.rstrip("."), "proposed", "make it true with Edit, Make the proposed edit"))
+def _go(forward: bool) -> Callable[[Workbench, Asks], object]:
+    """Go to the next or previous proposal, and select its markers."""
+
+    def run(bench: Workbench, asks: Asks) -> None:
+        proposals, here = _open(bench), bench.clock.marker_frame or 0
+        later = [p for p in proposals if p.frame > here]
+        sooner = [p for p in proposals if p.frame < here]
+        show(bench, (later or list(proposals))[0] if forward else (sooner or list(proposals))[-1])
+
+    return run
+
+
+def show(bench: Workbench, proposal: Proposal) -> None:
+    """Go to a proposal, select its markers, and say it."""
+    bench.walk.reach(frozenset(proposal.markers), proposal.frame)
+    remedy = "make it true with Edit, Make the proposed edit"
+    bench.say(Said("note", proposal.sentence.rstrip("."), "proposed", remedy))
 
 
 def _meant(bench: Workbench) -> Proposal | None:
-    """The proposal of the two selected markers that is nearest to the clock's frame."""
-    own = [p for p in bench.board.current[CLEAN].proposals if {*p.markers} == bench.selection.markers]
+    """The open proposal of the two selected markers that is nearest to the clock's frame."""
+    own = [p for p in _open(bench) if {*p.markers} == bench.selection.markers]
     here = bench.clock.marker_frame or 0
     return min(own, key=lambda proposal: abs(proposal.frame - here), default=None)
 
@@ -42,7 +60,54 @@ def _none_meant(bench: Workbench) -> str:
 def _accept(bench: Workbench, asks: Asks) -> None:
     proposal = _meant(bench)
     assert proposal is not None
-    bench.document.apply(clean_edits.accept(bench.document.session, proposal))
+    bench.document.apply(track_edits.accept(bench.document.session, [proposal]))
+
+
+def _reject(bench: Workbench, asks: Asks) -> None:
+    proposal = _meant(bench)
+    assert proposal is not None
+    bench.document.apply(track_edits.reject(bench.document.session, work_of(bench), [proposal]))
+
+
+def _accept_all(bench: Workbench, asks: Asks) -> None:
+    bench.document.apply(track_edits.accept(bench.document.session, _open(bench)))
+
+
+def _reconsider(bench: Workbench, asks: Asks) -> None:
+    bench.document.apply(track_edits.reconsider(bench.document.session))
+
+
+def _none_rejected(bench: Workbench) -> str:
+    return "" if work_of(bench).settings.rejected else "no proposal was rejected"
+
+
+ACCEPT: ActionWith[tuple[Proposal, ...]] = ActionWith(
+    "proposals.accept",
+    "Accept proposed edits",
+    lambda bench, asks, some: bench.document.apply(track_edits.accept(bench.document.session, some)),
+    lambda bench, some: no_tracks(bench) or ("" if some else "no proposal is chosen"),
+)
+REJECT: ActionWith[tuple[Proposal, ...]] = ActionWith(
+    "proposals.reject",
+    "Reject proposed edits",
+    lambda bench, asks, some: bench.document.apply(track_edits.reject(bench.document.session, work_of(bench), some)),
+    lambda bench, some: no_tracks(bench) or ("" if some else "no proposal is chosen"),
+)
+SHOW: ActionWith[Proposal] = ActionWith(
+    "proposals.show", "Go to a proposed edit", lambda bench, asks, one: show(bench, one), or_without(no_tracks)
+)
+CLEAN_WITH = (ACCEPT, REJECT, SHOW)
+
+
+def _walk_cut(forward: bool) -> Callable[[Workbench, Asks], object]:
+    """Go to the next or previous stretch that was cut as an outlier."""
+
+    def run(bench: Workbench, asks: Asks) -> None:
+        whose = "of the selected markers" if bench.walk.scope else "of any marker"
+        if not bench.walk.go(work_of(bench).cut_stretches, forward):
+            raise InputError(f"nothing {whose} was cut as an outlier", "outliers")
+
+    return run
 
 
 def _keep(bench: Workbench, asks: Asks) -> None:
@@ -88,9 +153,18 @@ CLEAN_ACTIONS = (
         "Next proposed edit of tracks",
         "Edit",
         "Go to the next place where two tracks seem to have been exchanged or broken, and select their markers.",
-        _next,
-        "Shift+N",
-        first(_needs_clean, _no_proposal),
+        _go(True),
+        "X",
+        first(no_tracks, _no_proposal),
+    ),
+    Action(
+        "clean.back",
+        "Previous proposed edit of tracks",
+        "Edit",
+        "Go to the place before where two tracks seem to have been exchanged or broken, and select their markers.",
+        _go(False),
+        "Shift+X",
+        first(no_tracks, _no_proposal),
     ),
     Action(
         "clean.accept",
@@ -99,7 +173,52 @@ CLEAN_ACTIONS = (
         "Exchange or join the tracks of the selected markers as the cleaning proposes it.",
         _accept,
         "Ctrl+Return",
-        first(_needs_clean, _none_meant),
+        first(no_tracks, _none_meant),
+    ),
+    Action(
+        "clean.reject",
+        "Reject the proposed edit",
+        "Edit",
+        "Have the edit that is proposed for the selected markers not offered any more.",
+        _reject,
+        "Ctrl+Shift+Return",
+        first(no_tracks, _none_meant),
+    ),
+    Action(
+        "clean.accept_all",
+        "Make all proposed edits",
+        "Edit",
+        "Make every edit of tracks that is proposed and not rejected; the next cleaning applies them together.",
+        _accept_all,
+        "",
+        first(no_tracks, _no_proposal),
+    ),
+    Action(
+        "clean.reconsider",
+        "Offer rejected edits again",
+        "Edit",
+        "Have the proposals that were rejected among the others again.",
+        _reconsider,
+        "",
+        first(no_tracks, _none_rejected),
+    ),
+    Action(
+        "go.outlier",
+        "Next outlier",
+        "Play",
+        "Go to the next stretch that was cut as an outlier, of a selected marker or of any, and select its marker.",
+        _walk_cut(True),
+        "U",
+        no_tracks,
+    ),
+    Action(
+        "go.outlier_back",
+        "Previous outlier",
+        "Play",
+        "Go to the previous stretch that was cut as an outlier, of a selected marker or of any, and select its marker.",
+        _walk_cut(False),
+        "Shift+U",
+        no_tracks,
     ),
     Action(
         "clean.keep",

@@ -10,7 +10,7 @@ from markerscope.app.actions.action import Action, ActionWith, Asks, Reason, fir
 from markerscope.app.models.clock import SPEEDS, Clock
 from markerscope.app.models.workbench import Said, Workbench
 from markerscope.solver.core.errors import InputError
-from markerscope.solver.pipeline.names import FIT, MARKERS
+from markerscope.solver.pipeline.names import FIT
 
 
 def _empty(bench: Workbench) -> str:
@@ -120,25 +120,27 @@ def _worst(bench: Workbench, asks: Asks) -> None:
     bench.clock.seek_marker_frame(int(np.argmax(known.max(axis=1))))
 
 
-def _next_gap(bench: Workbench, asks: Asks) -> None:
-    """Go to the next frame from which one of the selected markers, or of all, is lost; beyond the last, to the first.
+def _walk_gaps(forward: bool) -> Callable[[Workbench, Asks], object]:
+    """Go to the next or previous frame from which one of the selected markers, or of all, is lost, round the ends.
 
     Every marker's gaps count by themselves: in a real recording there is hardly a frame that shows them all.
     """
-    markers = bench.board.current[MARKERS]
-    chosen = sorted(m for m in bench.selection.markers if m < len(markers.labels)) or list(range(len(markers.labels)))
-    lost = ~markers.present[:, chosen]
-    begins = lost & ~np.concatenate([np.zeros((1, len(chosen)), bool), lost[:-1]])
-    starts = np.flatnonzero(begins.any(axis=1))
-    if not len(starts):
-        whose = "the selected markers are" if bench.selection.markers else "every marker is"
-        raise InputError(f"{whose} seen in every frame", "the next gap")
-    here = bench.clock.marker_frame or 0
-    later = starts[starts > here]
-    frame = int(later[0] if len(later) else starts[0])
-    if frame == here:
-        bench.say(Said("note", "This is the only gap", "the next gap"))
-    bench.clock.seek_marker_frame(frame)
+
+    def run(bench: Workbench, asks: Asks) -> None:
+        work, here = bench.working.now(), bench.clock.marker_frame or 0
+        assert work is not None
+        which = "the next gap" if forward else "the previous gap"
+        whose = "the selected markers are" if bench.walk.scope else "every marker is"
+        if not bench.walk.go(work.gaps, forward):
+            raise InputError(f"{whose} seen in every frame", which)
+        if bench.clock.marker_frame == here:
+            bench.say(Said("note", "This is the only gap", which))
+
+    return run
+
+
+def _no_tracks(bench: Workbench) -> str:
+    return "" if bench.working.now() is not None else "the markers have not been read"
 
 
 def _action(
@@ -221,9 +223,18 @@ PLAY_ACTIONS = (
         "go.gap",
         "Next gap",
         "Play",
-        "Go to the next frame from which a selected marker, or any where none is selected, is lost.",
-        _next_gap,
+        "Go to the next frame from which a selected marker, or any where none is selected, is lost, and select it.",
+        _walk_gaps(True),
         "N",
-        first(_empty, needs("markers", "the markers have not been read")),
+        first(_empty, _no_tracks),
+    ),
+    Action(
+        "go.gap_back",
+        "Previous gap",
+        "Play",
+        "Go to the previous frame from which a selected marker, or any where none is selected, is lost, and select it.",
+        _walk_gaps(False),
+        "Shift+N",
+        first(_empty, _no_tracks),
     ),
 )

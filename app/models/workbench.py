@@ -17,6 +17,7 @@ from markerscope.app.models.document import Document
 from markerscope.app.models.edits import Edit
 from markerscope.app.models.fields import title
 from markerscope.app.models.frames import VideoFrames
+from markerscope.app.models.gap_previews import GapPreviews
 from markerscope.app.models.home import Home
 from markerscope.app.models.jobs import Runner
 from markerscope.app.models.reading import Reading
@@ -25,6 +26,8 @@ from markerscope.app.models.selection import Selection
 from markerscope.app.models.signal import Signal
 from markerscope.app.models.stages import Failure, StageBoard
 from markerscope.app.models.view_state import restore_view, view_of
+from markerscope.app.models.walk import Walk
+from markerscope.app.models.working import WorkingTracks
 from markerscope.solver.core.errors import Cancelled, InputError, MarkerscopeError
 from markerscope.solver.pipeline.names import SYNC
 from markerscope.solver.pipeline.store import Absent
@@ -62,6 +65,9 @@ class Workbench:
     Attributes
     ----------
     document, board, runner, clock, selection, display : see their classes
+    working : the trajectories as the decisions of now have them
+    walk : from gap to gap, outlier to outlier
+    previews : the gap in question, filled by every way there is
     frames : of the session's video, None without one
     said : emitted with what the user has to be told
     video_changed : emitted when there is another video, or more of it
@@ -76,6 +82,9 @@ class Workbench:
         self.runner = Runner(self.board, now)
         self.clock = Clock()
         self.selection = Selection()
+        self.working = WorkingTracks(self.board)
+        self.walk = Walk(self.selection, self.clock)
+        self.previews = GapPreviews()
         self.display = Display()
         self.frames: VideoFrames | None = None
         self.said: Signal[[Said]] = Signal()
@@ -94,7 +103,8 @@ class Workbench:
     @property
     def busy(self) -> bool:
         """Whether something runs that ``tick`` has to watch: it is to be called often then."""
-        return self.runner.running or self.clock.playing or self._reading is not None or self._waits_for_video
+        waits = self._reading is not None or self._waits_for_video or self.previews.busy
+        return self.runner.running or self.clock.playing or waits
 
     @property
     def reading(self) -> bool:
@@ -107,6 +117,7 @@ class Workbench:
             self.board.results.poll()
         if self.frames is not None:
             self.frames.poll()
+        self.previews.poll()
         if self._reading is not None and self._reading.done:
             self._read()
         now = self.now()

@@ -11,10 +11,17 @@ from markerscope.widgets.dialogs.command_palette import PaletteEntry
 _SEPARATED = {
     "session.example", "input.markers", "session.save", "session.close", "select.all", "select.groups", "candidate.pin",
     "offset.found", "range.selected", "body.less", "text.100", "window.layout", "play.forward", "range.from",
-    "go.worst", "run.stop", "method.bundle", "export.picture", "help.about", "window.history",
+    "go.worst", "clean.next", "tracks.delete", "run.stop", "method.bundle", "export.picture", "help.about", "window.history",
 }  # fmt: skip
 """Actions that begin another part of their menu."""
-_WITHIN = {"colour": "Colours", "layer": "Layers", "camera": "Camera", "theme": "Look", "text": "Look"}
+_WITHIN = {
+    "colour": "Colours",
+    "layer": "Layers",
+    "camera": "Camera",
+    "theme": "Look",
+    "text": "Look",
+    "fill": "Fill the gap by",
+}
 """Actions of one group that share a menu within their menu, by what stands before the dot."""
 
 

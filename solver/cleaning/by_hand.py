@@ -90,9 +90,7 @@ def edited(markers: Markers, edits: TrackEdits) -> Markers:
     for number in range(columns, count):
         source = next((marker for marker, *_, to in edits.cuts if to == number), number)
         names.append(_new_name(names[source] if source < len(names) else f"{number}", names))
-    return replace(
-        markers, positions=positions, labels=tuple(names), filled=None if markers.filled is None else filled
-    )
+    return replace(markers, positions=positions, labels=tuple(names), filled=None if markers.filled is None else filled)
 
 
 def _new_name(name: str, taken: list[str]) -> str:

@@ -72,7 +72,9 @@ def parts_by_hand(
                     Fill(given.marker, first, last, "body", 0.0, given.error),
                     values[stretch],
                 )
-    made_by_hand = [(replace(f, by_hand=True, confidence=confidence_of(f.error)), values) for f, values in parts.values()]
+    made_by_hand = [
+        (replace(f, by_hand=True, confidence=confidence_of(f.error)), values) for f, values in parts.values()
+    ]
     return made_by_hand, tuple(notes)
 
 

@@ -16,7 +16,6 @@ from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.progress import Progress
 from markerscope.solver.pipeline.digest import CHANGES_NOTHING
 
-
 BY_FRAME = ("keep", "swaps", "joins", "deletes", "cuts", "fills", "placed", "rejected")
 """Settings that are decided by hand and name markers and frames."""
 
