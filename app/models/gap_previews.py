@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -110,12 +111,8 @@ class GapPreviews:
             self._arrived = []
             turn = self._turn
         if work is not None and gap is not None:
-            self._thread = threading.Thread(
-                target=self._make,
-                args=(turn, lambda way: preview(work, placed, gap, way)),
-                name="previews",
-                daemon=True,
-            )
+            make = partial(preview, work, placed, gap)
+            self._thread = threading.Thread(target=self._make, args=(turn, make), name="previews", daemon=True)
             self._thread.start()
         self.changed.emit()
 

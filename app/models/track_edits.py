@@ -243,7 +243,8 @@ def _uncut(session: Session, markers: Sequence[int], first: int, last: int) -> d
     own = [row for row in settings.cuts if row[3] == number]
     begins = min(row[1] for row in own)
     moved = {m for a, b, *_ in (*settings.swaps, *settings.joins) for m in (a, b)}
-    moved |= {m for m, *_ in (*settings.keep, *settings.fills)} | {row.marker for row in settings.placed}
+    moved |= {row[0] for row in settings.keep} | {row[0] for row in settings.fills}
+    moved |= {row.marker for row in settings.placed}
     meant = {number, *(row[0] for row in own)} & {*markers}
     if not meant or not first <= begins <= last or number in moved:
         return {}

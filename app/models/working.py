@@ -40,9 +40,9 @@ class Working:
 
     @cached_property
     def outliers(self) -> np.ndarray:
-        """(T, M') True where a sample is taken for an outlier; of the last cleaning, as far as the samples are its own."""
+        """(T, M') True where a sample counts as an outlier: by the last cleaning, if it is the same sample."""
         positions = self.edited.positions
-        found = np.zeros(positions.shape[:2], dtype=bool)
+        found: np.ndarray = np.zeros(positions.shape[:2], dtype=bool)
         if self.cleaned is None or not len(self.cleaned.outliers.frame):
             return found
         cut = self.cleaned.outliers
@@ -85,7 +85,7 @@ class Working:
 
     @property
     def proposals(self) -> tuple[Proposal, ...]:
-        """What the last cleaning proposes, by frame, rejected ones left out; those accepted since are still among it."""
+        """What the last cleaning proposes, by frame, less what was rejected; those accepted since are among it."""
         if self.cleaned is None:
             return ()
         rejected = set(self.settings.rejected)

@@ -11,7 +11,8 @@ from markerscope.widgets.dialogs.command_palette import PaletteEntry
 _SEPARATED = {
     "session.example", "input.markers", "session.save", "session.close", "select.all", "select.groups", "candidate.pin",
     "offset.found", "range.selected", "body.less", "text.100", "window.layout", "play.forward", "range.from",
-    "go.worst", "clean.next", "tracks.delete", "run.stop", "method.bundle", "export.picture", "help.about", "window.history",
+    "go.worst", "clean.next", "tracks.delete", "run.stop", "method.bundle", "export.picture", "help.about",
+    "window.history",
 }  # fmt: skip
 """Actions that begin another part of their menu."""
 _WITHIN = {

@@ -1,4 +1,4 @@
-"""Hand edits of trajectories: samples taken out, trajectories cut in two, exchanged and joined; nothing is lost by it."""
+"""Hand edits of trajectories: samples taken out, trajectories cut in two, exchanged, joined; nothing is lost by it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NOWHERE = -1
 class TrackEdits:
     """What was decided about trajectories; frames count from 0, both ends inclusive.
 
-    The first two name trajectories as the file has them, so that they mean the same samples whatever is exchanged later.
+    The first two name trajectories as the file has them: the same samples are meant whatever is exchanged later.
 
     Attributes
     ----------
@@ -78,14 +78,14 @@ def edited(markers: Markers, edits: TrackEdits) -> Markers:
     positions = np.full((frames, count, 3), np.nan)
     filled = np.zeros((frames, count), dtype=bool)
     for column in range(count):
-        source = found[:, column]
-        if column < columns and (source == column).all():
+        shown = found[:, column]
+        if column < columns and (shown == column).all():
             positions[:, column] = markers.positions[:, column]
             filled[:, column] = False if markers.filled is None else markers.filled[:, column]
             continue
-        frame = np.flatnonzero(source != NOWHERE)
-        positions[frame, column] = markers.positions[frame, source[frame]]
-        filled[frame, column] = False if markers.filled is None else markers.filled[frame, source[frame]]
+        frame = np.flatnonzero(shown != NOWHERE)
+        positions[frame, column] = markers.positions[frame, shown[frame]]
+        filled[frame, column] = False if markers.filled is None else markers.filled[frame, shown[frame]]
     names = list(markers.labels)
     for number in range(columns, count):
         source = next((marker for marker, *_, to in edits.cuts if to == number), number)

@@ -95,7 +95,7 @@ class Cleaned:
 
     @cached_property
     def decided(self) -> Markers:
-        """What was measured and not cut, with the gaps that were filled by hand, flagged as filled: what is exported."""
+        """What was measured and not cut, with the gaps that were filled by hand, flagged: what is exported."""
         others = tuple(fill for fill in self.fills if not fill.by_hand)
         return put_back(replace(self, fills=others), outliers=False) if others else self.markers
 

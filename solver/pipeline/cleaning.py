@@ -115,7 +115,8 @@ def require_markers(settings: CleaningSettings, columns: int) -> None:
         )
     own = [m for m, *_ in (*settings.deletes, *settings.cuts)]
     named = [m for a, b, *_ in (*settings.swaps, *settings.joins) for m in (a, b)]
-    named += [m for m, *_ in (*settings.keep, *settings.fills)] + [given.marker for given in settings.placed]
+    named += [row[0] for row in settings.keep] + [row[0] for row in settings.fills]
+    named += [given.marker for given in settings.placed]
     for markers, most in ((own, columns), (named, count)):
         for marker in markers:
             if not 0 <= marker < most:

@@ -120,7 +120,7 @@ def test_fills_by_hand_are_made_by_the_stage_flagged_and_measured_nowhere() -> N
 def test_places_of_the_body_fill_what_is_lost_and_nothing_else() -> None:
     truth = rigid()
     markers = of(lose(truth, (1, 30, 60)))
-    skin = truth + [0.004, 0.0, 0.0]
+    skin = truth + np.array([0.004, 0.0, 0.0])
     made = fill_gap_by_body(markers.positions, skin, RATE, Gap(1, 30, 60))
     assert made is not None and worst(made[1], truth[30:61, 1]) < 1e-9, "what is left at the ends is blended"
     late = np.concatenate([np.zeros((1500, *truth.shape[1:])), truth])
