@@ -88,7 +88,7 @@ def _no_ghost(bench: Workbench) -> str:
 
 
 def _cloud(bench: Workbench, asks: Asks) -> None:
-    found, labels = bench.board.current["localize"], bench.board.current["markers"].labels
+    found, labels = bench.board.current["localize"], bench.labels
     sizes = np.bincount(found.cloud[found.cloud >= 0])
     members = [[labels[m] for m in np.flatnonzero(found.cloud == c)] for c in range(len(sizes))]
     options = [

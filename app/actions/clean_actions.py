@@ -12,7 +12,7 @@ from markerscope.app.models import clean_edits, track_edits
 from markerscope.app.models.workbench import Said, Workbench
 from markerscope.solver.cleaning.swaps import Proposal
 from markerscope.solver.core.errors import InputError
-from markerscope.solver.pipeline.names import CLEAN, MARKERS
+from markerscope.solver.pipeline.names import CLEAN
 
 _needs_clean = needs("clean", "the markers have not been cleaned")
 
@@ -121,7 +121,7 @@ def _keep(bench: Workbench, asks: Asks) -> None:
     }
     if not stretches:
         raise InputError("nothing was cut of the selected markers there", "what was cut", "click on a cut frame first")
-    labels = bench.board.current[MARKERS].labels
+    labels = cleaned.markers.labels
     bench.document.apply(clean_edits.keep_samples(bench.document.session, stretches, labels))
 
 

@@ -39,7 +39,7 @@ def _nothing_redone(bench: Workbench) -> str:
 
 
 def _all(bench: Workbench, asks: Asks) -> None:
-    bench.selection.select_markers(range(len(bench.board.current["markers"].labels)))
+    bench.selection.select_markers(range(len(bench.labels)))
 
 
 def _none(bench: Workbench, asks: Asks) -> None:
@@ -47,7 +47,7 @@ def _none(bench: Workbench, asks: Asks) -> None:
 
 
 def _all_selected(bench: Workbench) -> str:
-    every = len(bench.selection.markers) == len(bench.board.current["markers"].labels)
+    every = len(bench.selection.markers) == len(bench.labels)
     return "all markers are selected already" if every else ""
 
 
@@ -59,7 +59,7 @@ def _nothing_selected(bench: Workbench) -> str:
 
 
 def _invert(bench: Workbench, asks: Asks) -> None:
-    bench.selection.select_markers(range(len(bench.board.current["markers"].labels)), "toggle")
+    bench.selection.select_markers(range(len(bench.labels)), "toggle")
 
 
 def _whole_groups(bench: Workbench, asks: Asks) -> None:

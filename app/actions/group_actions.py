@@ -29,7 +29,7 @@ class GroupEdit:
 
 def _edited(bench: Workbench, asked: GroupEdit) -> None:
     found: Segmentation = bench.board.current["segment"]
-    session, labels = bench.document.session, bench.board.current["markers"].labels
+    session, labels = bench.document.session, bench.labels
     if asked.kind == "move":
         host = int(np.flatnonzero(found.clusters == asked.target)[0])
         edit = group_edits.move(session, found, asked.markers, host, labels)
@@ -98,7 +98,7 @@ def _by_key(kind: Kind, title: str, help: str, shortcut: str) -> Action:
 
 def _move(bench: Workbench, asks: Asks) -> None:
     found: Segmentation = bench.board.current["segment"]
-    labels, chosen = bench.board.current["markers"].labels, _selected(bench, "move").markers
+    labels, chosen = bench.labels, _selected(bench, "move").markers
     own = {int(found.clusters[m]) for m in chosen}
     targets = [k for k in range(found.count) if own != {k}]
     members = {k: [labels[m] for m in np.flatnonzero(found.clusters == k)] for k in targets}

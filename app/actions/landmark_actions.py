@@ -36,7 +36,7 @@ def _pin(bench: Workbench, asks: Asks) -> None:
     (marker,) = bench.selection.markers
     body = bench.document.session.inputs.get("body_file")
     sites = bony_sites(Body.load(None if body is None else body.path))
-    labels, fitted = bench.board.current["markers"].labels, not _fitted(bench)
+    labels, fitted = bench.labels, not _fitted(bench)
     # The landmarks of the marker's own bone first, where that is known: it is nearly always one of them.
     bone = bench.board.current["fit"].marker_joint[marker] if fitted else -1
     names = [sites.names[i] for i in np.argsort(sites.bone != bone, kind="stable")]
@@ -46,13 +46,13 @@ def _pin(bench: Workbench, asks: Asks) -> None:
 
 
 def _refuse(bench: Workbench, asks: Asks) -> None:
-    pull, labels = bench.board.current["fit"].pull, bench.board.current["markers"].labels
+    pull, labels = bench.board.current["fit"].pull, bench.labels
     drawn = [(m, "" if pull is None else pull.landmark[m]) for m in sorted(bench.selection.markers)]
     bench.document.apply(landmark_edits.refuse(bench.document.session, drawn, labels))
 
 
 def _release(bench: Workbench, asks: Asks) -> None:
-    labels = bench.board.current["markers"].labels
+    labels = bench.labels
     bench.document.apply(landmark_edits.release(bench.document.session, bench.selection.markers, labels))
 
 

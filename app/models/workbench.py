@@ -20,6 +20,7 @@ from markerscope.app.models.frames import VideoFrames
 from markerscope.app.models.gap_previews import GapPreviews
 from markerscope.app.models.home import Home
 from markerscope.app.models.jobs import Runner
+from markerscope.app.models.pending_fills import PendingFills
 from markerscope.app.models.reading import Reading
 from markerscope.app.models.results import Ref, Unread
 from markerscope.app.models.selection import Selection
@@ -29,7 +30,7 @@ from markerscope.app.models.view_state import restore_view, view_of
 from markerscope.app.models.walk import Walk
 from markerscope.app.models.working import WorkingTracks
 from markerscope.solver.core.errors import Cancelled, InputError, MarkerscopeError
-from markerscope.solver.pipeline.names import SYNC
+from markerscope.solver.pipeline.names import CLEAN, MARKERS, SYNC
 from markerscope.solver.pipeline.store import Absent
 
 Level = Literal["note", "warning", "error"]
@@ -68,6 +69,7 @@ class Workbench:
     working : the trajectories as the decisions of now have them
     walk : from gap to gap, outlier to outlier
     previews : the gap in question, filled by every way there is
+    pending : what views wait for of fills that were decided
     frames : of the session's video, None without one
     said : emitted with what the user has to be told
     video_changed : emitted when there is another video, or more of it
@@ -85,6 +87,7 @@ class Workbench:
         self.working = WorkingTracks(self.board)
         self.walk = Walk(self.selection, self.clock)
         self.previews = GapPreviews()
+        self.pending: list[PendingFills] = []
         self.display = Display()
         self.frames: VideoFrames | None = None
         self.said: Signal[[Said]] = Signal()
@@ -103,8 +106,15 @@ class Workbench:
     @property
     def busy(self) -> bool:
         """Whether something runs that ``tick`` has to watch: it is to be called often then."""
-        waits = self._reading is not None or self._waits_for_video or self.previews.busy
+        waits = self._reading is not None or self._waits_for_video
+        waits = waits or self.previews.busy or any(fills.busy for fills in self.pending)
         return self.runner.running or self.clock.playing or waits
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the markers: of the cleaning in force, which may have cut trajectories in two, else of the file."""
+        current = self.board.current
+        return current[CLEAN].markers.labels if "clean" in current else current[MARKERS].labels
 
     @property
     def reading(self) -> bool:
@@ -118,6 +128,8 @@ class Workbench:
         if self.frames is not None:
             self.frames.poll()
         self.previews.poll()
+        for fills in self.pending:
+            fills.poll()
         if self._reading is not None and self._reading.done:
             self._read()
         now = self.now()

@@ -110,9 +110,17 @@ class Working:
             return (a, b, int(proposal.frame)) in self.settings.swaps
         return (a, b, int(proposal.frame), int(proposal.last)) in self.settings.joins
 
+    @cached_property
+    def of_marker(self) -> dict[int, list[Gap]]:
+        """The gaps of each marker that has some, by frame."""
+        found: dict[int, list[Gap]] = {}
+        for gap in self.gaps:
+            found.setdefault(gap.marker, []).append(gap)
+        return found
+
     def gaps_of(self, marker: int, first: int, last: int) -> list[Gap]:
         """The gaps of a marker that a span of frames touches."""
-        return [gap for gap in self.gaps if gap.marker == marker and gap.first <= last and gap.last >= first]
+        return [gap for gap in self.of_marker.get(marker, ()) if gap.first <= last and gap.last >= first]
 
     def seen_sources(self, marker: int, first: int, last: int) -> list[tuple[int, int, int]]:
         """(file's trajectory, first, last): the samples of the file that a marker shows in a span, outliers too."""

@@ -18,6 +18,7 @@ DRAWN: Mapping[str, tuple[str, ...]] = {
     "convergence": ("localize", "solve", "orient"),
     "markers": (*_MARKERS, "segment", "fit", "check"),
     "timelines": (*_MARKERS, "landmarks", "prior", "sync", "segment", "orient", "fit"),
+    "curves": (*_MARKERS, "fit"),
     "angles": ("fit", "neutral", "angles"),
 }
 """The stages whose results each view may draw, by panel. Cards and the history stand apart: they name their states."""

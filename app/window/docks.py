@@ -11,7 +11,7 @@ _GROUPS = (
     ("stages", "history"),
     ("video",),
     ("affinity", "candidates", "hypotheses", "convergence", "markers"),
-    ("timelines", "angles"),
+    ("timelines", "curves", "angles"),
 )
 """Panels that share a place, from the top of each side."""
 

@@ -22,6 +22,7 @@ from markerscope.app.window.bind_convergence import ConvergenceBinder
 from markerscope.app.window.bind_dated import DatedBinder
 from markerscope.app.window.bind_history import HistoryBinder
 from markerscope.app.window.bind_hypotheses import HypothesesBinder
+from markerscope.app.window.bind_marker_curves import MarkerCurvesBinder
 from markerscope.app.window.bind_markers import MarkersBinder
 from markerscope.app.window.bind_messages import MessagesBinder
 from markerscope.app.window.bind_scene import SceneBinder
@@ -45,11 +46,13 @@ from markerscope.widgets.panels.hypotheses import HypothesesView
 from markerscope.widgets.panels.message_bar import MessageBar
 from markerscope.widgets.panels.progress_strip import ProgressStrip
 from markerscope.widgets.panels.stage_panel import StagePanel
+from markerscope.widgets.panels.track_editor import TrackEditor
 from markerscope.widgets.panels.transport import Transport
 from markerscope.widgets.panels.welcome import WelcomePage
 from markerscope.widgets.plots.affinity import AffinityView
 from markerscope.widgets.plots.convergence import ConvergenceView
 from markerscope.widgets.plots.curves import CurvesView
+from markerscope.widgets.plots.marker_curves import MarkerCurvesView
 from markerscope.widgets.plots.pair import PairPlot
 from markerscope.widgets.plots.timelines import Timelines
 from markerscope.widgets.scene import Scene3D
@@ -110,6 +113,8 @@ class MainWindow(QMainWindow):
         self.affinity, self.pair = AffinityView(), PairPlot()
         self.candidates, self.hypotheses = CandidateTable(), HypothesesView()
         self.convergence, self.markers, self.angles = ConvergenceView(), MarkerTable(), CurvesView()
+        self.track_editor = TrackEditor()
+        self.curves = MarkerCurvesView(self.track_editor)
         self.history, self.welcome, self.progress = HistoryList(), WelcomePage(), ProgressStrip()
         self.pair.setVisible(False)
         self.pages = QStackedWidget()
@@ -126,6 +131,7 @@ class MainWindow(QMainWindow):
             "convergence": Dated(self.convergence),
             "markers": Dated(self.markers),
             "timelines": Dated(self.timelines),
+            "curves": Dated(self.curves),
             "angles": Dated(self.angles),
         }
         dated = self.dated
@@ -141,6 +147,7 @@ class MainWindow(QMainWindow):
                 Panel("convergence", "Convergence", dated["convergence"], _RIGHT, "How the energies fell"),
                 Panel("markers", "Markers", dated["markers"], _RIGHT, "Every marker with its gaps and residuals"),
                 Panel("timelines", "Timelines", dated["timelines"], _BOTTOM, "All streams along the clock"),
+                Panel("curves", "Marker curves", dated["curves"], _BOTTOM, "x, y and z over time, and edits of them"),
                 Panel("angles", "Angles", dated["angles"], _BOTTOM, "Joint angles, left and right"),
             ],
         )
@@ -163,6 +170,7 @@ class MainWindow(QMainWindow):
             HypothesesBinder(self.hypotheses, bench, shown, ghosts, self.scene, self.table),
             ConvergenceBinder(self.convergence, bench, shown, ghosts),
             MarkersBinder(self.markers, bench, shown),
+            MarkerCurvesBinder(self.curves, self.track_editor, self.timelines, bench, shown, self.table),
             AnglesBinder(self.angles, bench, shown, self.table),
             HistoryBinder(self.history, bench, self.table),
             DatedBinder(self.dated, shown),

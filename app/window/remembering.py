@@ -24,6 +24,7 @@ def parts_of(window: MainWindow) -> dict[str, Any]:
         "video": window.video.state(),
         "timelines": list(window.timelines.view()),
         "angles": window.angles.shown(),
+        "curves": window.curves.state(),
         "open_stages": window.stages.open_cards(),
     }  # fmt: skip
 

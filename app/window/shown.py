@@ -94,6 +94,8 @@ class Shown:
                 changed.add("compared")
         old = frozenset(stage for stage in self._refs if self.stale(stage))
         turned, self._old = (old ^ self._old) - changed, old
+        if changed & {"markers", "clean"} and (markers := self.markers) is not None:
+            self.bench.selection.keep_within(len(markers.labels))
         if changed:
             self.changed.emit(frozenset(changed))
         if turned:
@@ -170,9 +172,11 @@ class Shown:
     def markers(self) -> Markers | None:
         """The trajectories, cleaned where they have been; None before they are read."""
         raw, cleaned = self.get("markers"), self.get("clean")
-        if cleaned is not None and (raw is None or cleaned.markers.positions.shape == raw.positions.shape):
-            return cleaned.markers
-        return raw
+        if cleaned is None or raw is None:
+            return raw if cleaned is None else cleaned.markers
+        frames, columns = raw.positions.shape[:2]
+        now = cleaned.markers.positions.shape  # trajectories that were cut in two come behind those of the file
+        return cleaned.markers if now[0] == frames and now[1] >= columns else raw
 
     @property
     def fit(self) -> FittedMotion | None:

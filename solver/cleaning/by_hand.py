@@ -54,8 +54,8 @@ def sources(edits: TrackEdits, frames: int, columns: int) -> np.ndarray:
     for marker, first, last in edits.deletes:
         goes_to[first : last + 1, marker] = NOWHERE
     found = np.full((frames, count), NOWHERE, dtype=np.int32)
-    frame, marker = np.nonzero(goes_to != NOWHERE)
-    found[frame, goes_to[frame, marker]] = marker
+    kept, column = np.nonzero(goes_to != NOWHERE)
+    found[kept, goes_to[kept, column]] = column
     moves = [(first, "swap", a, b, frames - 1) for a, b, first in edits.swaps]
     moves += [(first, "join", a, b, last) for a, b, first, last in edits.joins]
     for first, kind, a, b, last in sorted(moves, key=lambda move: move[0]):
