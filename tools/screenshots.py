@@ -155,12 +155,30 @@ def pictures(window: MainWindow, spin: Spin, out: Path) -> None:
     dock("hypotheses", "hypotheses", 2.5)
     dock("markers", "markers")
     dock("timelines", "timelines")
+    curves(window, spin, dock)
     window.stages.set_open_cards(["clean"])
     window.raise_dock("stages")
     spin()
     keep(window.stages.card("clean"), out / "cleaning.png")
     window.stages.set_open_cards([])
     compared(window, spin, out, dock)
+
+
+def curves(window: MainWindow, spin: Spin, dock: Callable[[str, str], None]) -> None:
+    """A gap of some length, previewed by every way of filling."""
+    bench = window.bench
+    work = bench.working.now()
+    assert work is not None
+    gap = max((g for g in work.gaps if g.first > 50), key=lambda g: g.length)
+    window.raise_dock("curves")
+    bench.selection.select_markers([gap.marker])
+    bench.clock.seek_marker_frame(gap.first)
+    spin(lambda: bench.previews.gap == gap and not bench.previews.busy, 0.5)
+    window.curves.plots.show_gap(bench.clock.time)
+    dock("curves", "marker-curves")
+    window.curves.plots.reset()
+    bench.selection.clear()
+    bench.clock.seek(3.2)
 
 
 def compared(window: MainWindow, spin: Spin, out: Path, dock: Callable[[str, str], None]) -> None:

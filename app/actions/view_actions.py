@@ -15,6 +15,7 @@ _COLOUR_TITLES: dict[ColourBy, str] = {
     "residual": "Colour by residual",
     "gaps": "Colour by gaps",
     "selection": "Colour by selection",
+    "skin": "Colour by distance to the skin",
 }
 _CAMERAS = {
     "front": "From the front", "back": "From the back", "left": "From the left", "right": "From the right",
@@ -23,7 +24,15 @@ _CAMERAS = {
 LONGEST_TRAIL_S = 10.0
 TEXT_PERCENT = (100, 125, 150)
 """Sizes of text, of the desktop's own."""
-_LAYER_KEYS = {"labels": "L", "trails": "T", "body": "B", "skeleton": "K", "bones": "Shift+K", "ghosts": "H"}
+_LAYER_KEYS = {
+    "labels": "L",
+    "trails": "T",
+    "body": "B",
+    "skeleton": "K",
+    "bones": "Shift+K",
+    "ghosts": "H",
+    "neighbours": "I",
+}
 
 
 def _colour(colour: ColourBy, number: int) -> Action:

@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args
 
 from markerscope.app.models.signal import Signal
 
-ColourBy = Literal["cluster", "bone", "residual", "gaps", "selection"]
+ColourBy = Literal["cluster", "bone", "residual", "gaps", "selection", "skin"]
 COLOURS: tuple[ColourBy, ...] = get_args(ColourBy)
 Statistic = Literal["mean", "median", "p95", "worst"]
 STATISTICS: dict[Statistic, str] = {"mean": "Mean", "median": "Median", "p95": "95th percentile", "worst": "Worst"}
@@ -21,6 +21,7 @@ LAYERS = {
     "skeleton": ("Skeleton", True),
     "bones": ("Bones", True),
     "links": ("Lines from markers to the skin", False),
+    "neighbours": ("Neighbours that move rigidly", False),
     "ghosts": ("Ghosts of other answers", True),
     "landmarks": ("Landmarks in the video", True),
     "projected": ("Markers and body in the video", True),

@@ -13,7 +13,7 @@ from markerscope.solver.core.skeleton import BONES, JOINTS
 from markerscope.widgets import palette
 from markerscope.widgets.colour_bar import ColourBar
 
-ColourBy = Literal["cluster", "bone", "residual", "gaps", "selection"]
+ColourBy = Literal["cluster", "bone", "residual", "gaps", "selection", "skin"]
 RGB = tuple[int, int, int]
 
 _STATE_COLOURS = np.array([palette.GOOD, palette.DOUBTFUL, palette.OUTLIER, palette.GAP], dtype=np.uint8)

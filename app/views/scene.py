@@ -9,6 +9,7 @@ import numpy as np
 
 from markerscope.app.views.bodies import BodyTrack
 from markerscope.app.views.colours import ColourBy, Coloured, by_bone, by_cluster, by_residual, by_selection, by_state
+from markerscope.app.views.skin import by_skin
 from markerscope.app.views.tracks import MarkerTracks
 from markerscope.solver.clustering.segment import Segmentation
 from markerscope.solver.fit.results import FittedMotion
@@ -50,6 +51,7 @@ def markers_at(
     motion: FittedMotion | None = None,
     bones: np.ndarray | None = None,
     selected: Collection[int] = (),
+    skin: np.ndarray | None = None,
 ) -> SceneMarkers:
     """The markers of one frame.
 
@@ -60,6 +62,7 @@ def markers_at(
     ----------
     clusters : (M,) groups while a cut is being dragged, instead of the segmentation's
     bones : (M,) bones of another answer than the fit's, -1 for none
+    skin : (M,) m, signed distance of the markers to the skin in this frame
     """
     if clusters is None and segmentation is not None:
         clusters = segmentation.clusters
@@ -71,6 +74,8 @@ def markers_at(
         coloured = by_bone(bones)
     elif by == "residual" and motion is not None:
         coloured = by_residual(motion.residual[frame])
+    elif by == "skin" and skin is not None:
+        coloured = by_skin(skin)
     elif by == "selection":
         coloured = by_selection(tracks.state.shape[1], selected)
     else:

@@ -9,15 +9,17 @@ from PySide6.QtCore import Qt
 
 from markerscope.app.models.fields import title
 from markerscope.app.models.workbench import Said, Workbench
-from markerscope.app.views import scene
+from markerscope.app.views import neighbours, scene
 from markerscope.app.views.bodies import BodyTrack
 from markerscope.app.views.colours import RGB, Legend
 from markerscope.app.views.posing import BONE_EDGES
+from markerscope.app.views.tracks import MarkerTracks
 from markerscope.app.window.ghosts import Ghosts
 from markerscope.app.window.keys import how
 from markerscope.app.window.once import Once
 from markerscope.app.window.shown import Shown
 from markerscope.widgets import palette, theme
+from markerscope.widgets.colour_bar import ColourBar
 from markerscope.widgets.scene import Legend as Drawn
 from markerscope.widgets.scene import Scene3D
 
@@ -27,7 +29,7 @@ TROUBLE_REMEDY = "all else works on; save the session, and open it again if it d
 """What to do where a view cannot be drawn."""
 OUT_OF_DATE = "Out of date"
 _OLD_BONE: RGB = (128, 128, 128)
-_COLOURED = {"cluster": "segment", "bone": "fit", "residual": "fit"}
+_COLOURED = {"cluster": "segment", "bone": "fit", "residual": "fit", "skin": "fit"}
 """The stage that the colours of the markers come from."""
 
 
@@ -81,16 +83,25 @@ class SceneBinder:
         frame = tracks.nearest(time)
         drawn = scene.markers_at(
             tracks, frame, display.colour_by, segmentation=self.shown.segmentation, clusters=self.clusters,
-            motion=self.shown.fit, selected=bench.selection.markers,
+            motion=self.shown.fit, selected=bench.selection.markers, skin=self.shown.skin(frame),
         )  # fmt: skip
         widget = self.widget
         widget.set_markers(drawn.positions if layers["markers"] else drawn.positions * np.nan, drawn.coloured.colours)
         widget.set_selected(bench.selection.markers)
         widget.set_trails(scene.trails(tracks, frame, display.trail_s) if layers["trails"] else None)
         self._say(drawn.coloured.legend, self._old())
+        self._draw_neighbours(tracks, frame)
         self._draw_body(frame, time)
         self._draw_ghosts(time)
         widget.follow_point(scene.middle(tracks, frame))
+
+    def _draw_neighbours(self, tracks: MarkerTracks, frame: int) -> None:
+        found = self.shown.segmentation
+        if found is None or not self.bench.display.layers["neighbours"]:
+            self.widget.set_lines("neighbours", None, None)
+            return
+        graph = self.shown.once("neighbours", (found,), lambda: neighbours.graph_of(found))
+        self.widget.set_lines("neighbours", *neighbours.graph_at(tracks, graph, frame))
 
     def _draw_body(self, frame: int, time: float) -> None:
         widget, track, display = self.widget, self.shown.track, self.bench.display
@@ -189,10 +200,13 @@ class SceneBinder:
 
     def _say(self, legend: Legend, old: tuple[tuple[str, RGB], ...]) -> None:
         ghosts = tuple((ghost.title, ghost.colour) for ghost in self.ghosts.all) if self._ghosts_on() else ()
-        if (legend, ghosts, old) == self._legend:
+        said = legend, ghosts, old, self.bench.display.layers["neighbours"], self.shown.segmentation is None
+        if said == self._legend:
             return
-        self._legend = legend, ghosts, old
+        self._legend = said
         others = Drawn("Ghosts", ghosts) if ghosts else None
+        if self.shown.segmentation is not None and self.bench.display.layers["neighbours"]:
+            others = Drawn("Distance varies by", ColourBar(0.0, 1000 * neighbours.LIMIT_M, "mm"), others)
         self.widget.set_legend(
             legend.title,
             legend.entries,
@@ -205,6 +219,7 @@ class SceneBinder:
         self._clear_bones()
         self.widget.set_bones("skeleton", None, BONE_EDGES)
         self.widget.set_lines("links", None, None)
+        self.widget.set_lines("neighbours", None, None)
         self.widget.set_legend("", None)
         self.widget.set_trails(None)
         self._legend = None

@@ -101,9 +101,10 @@ class VideoBinder:
         track = self.shown.track
         found = video.projection_at(camera, sync, frame.time, tracks, track)
         scale = frame.picture.shape[1] / camera.image_size[0]
+        at = tracks.nearest(self.bench.clock.time)
         coloured = scene.markers_at(
-            tracks, tracks.nearest(self.bench.clock.time), self.bench.display.colour_by,
-            segmentation=self.shown.segmentation, motion=self.shown.fit, selected=self.bench.selection.markers,
+            tracks, at, self.bench.display.colour_by, segmentation=self.shown.segmentation, motion=self.shown.fit,
+            selected=self.bench.selection.markers, skin=self.shown.skin(at),
         ).coloured  # fmt: skip
         layers = self.bench.display.layers
         self.widget.set_markers(found.markers * scale if layers["markers"] else None, coloured.colours)

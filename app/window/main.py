@@ -156,6 +156,9 @@ class MainWindow(QMainWindow):
         bench, shown, ghosts = self.bench, self.shown, self.ghosts
         self.scene_binder = scene = SceneBinder(self.scene, bench, shown, ghosts)
         self.video_binder = VideoBinder(self.video, bench, shown)
+        self.curves_binder = MarkerCurvesBinder(
+            self.curves, self.track_editor, self.timelines, bench, shown, self.table
+        )
         self.scene_menu = SceneMenu(self.scene, bench, shown, self.table)
         self.binders = [
             scene,
@@ -170,7 +173,7 @@ class MainWindow(QMainWindow):
             HypothesesBinder(self.hypotheses, bench, shown, ghosts, self.scene, self.table),
             ConvergenceBinder(self.convergence, bench, shown, ghosts),
             MarkersBinder(self.markers, bench, shown),
-            MarkerCurvesBinder(self.curves, self.track_editor, self.timelines, bench, shown, self.table),
+            self.curves_binder,
             AnglesBinder(self.angles, bench, shown, self.table),
             HistoryBinder(self.history, bench, self.table),
             DatedBinder(self.dated, shown),

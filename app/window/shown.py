@@ -8,11 +8,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from markerscope.app.models.results import Ref
 from markerscope.app.models.signal import Signal
 from markerscope.app.models.workbench import Workbench
 from markerscope.app.views import bodies
 from markerscope.app.views.bodies import BodyTrack
+from markerscope.app.views.skin import signed_distance
 from markerscope.app.views.tracks import MarkerTracks, tracks_of
 
 if TYPE_CHECKING:
@@ -51,6 +54,7 @@ class Shown:
         self._coming: threading.Thread | None = None
         self._spoilt: tuple[Path, str] | None = None
         self._posed: tuple[FittedMotion, BodyTrack] | None = None
+        self._skin: tuple[BodyTrack, MarkerTracks, int, np.ndarray] | None = None
         bench.board.prepare = self._prepare
         bench.board.changed.connect(self.follow)
         bench.document.changed.connect(self._begin_anew)
@@ -245,6 +249,18 @@ class Shown:
         if ref.stage == "fit":
             with suppress(Exception):  # whoever draws it hears why
                 self._posed = value, bodies.of_motion(self.body, value).ready()
+
+    def skin(self, frame: int) -> np.ndarray | None:
+        """(M,) m, signed distance of the markers to the skin in a frame, where they are coloured by it; else None."""
+        tracks, track, motion = self.tracks, self.track, self.fit
+        if self.bench.display.colour_by != "skin" or tracks is None or track is None or motion is None:
+            return None
+        known = self._skin
+        if known is None or known[0] is not track or known[1] is not tracks or known[2] != frame:
+            vertices = track.vertices(tracks.time(frame))
+            self._skin = track, tracks, frame, signed_distance(tracks.seen(frame), vertices, track.faces())
+        assert self._skin is not None
+        return self._skin[3]
 
     @property
     def clusters(self) -> Any:

@@ -6,11 +6,22 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from markerscope.widgets import palette
+from markerscope.widgets.panels.track_editor import TrackEditor
 from markerscope.widgets.plots.affinity import AffinityView
 from markerscope.widgets.plots.angle_data import AngleCurve, AnglePlot
 from markerscope.widgets.plots.convergence import ConvergenceView
 from markerscope.widgets.plots.convergence_data import EnergyCurve
 from markerscope.widgets.plots.curves import CurvesView
+from markerscope.widgets.plots.marker_curve_data import (
+    KIND_TITLES,
+    CurvePicture,
+    CurvePlot,
+    Line,
+    ProposalRow,
+    Shade,
+    Way,
+)
+from markerscope.widgets.plots.marker_curves import MarkerCurvesView
 from markerscope.widgets.plots.pair import PairPlot
 from markerscope.widgets.plots.rows import Curve, CurveRow, OffsetRow, PresenceRow, StateRow
 from markerscope.widgets.plots.timelines import Timelines
@@ -154,6 +165,44 @@ def curves() -> QWidget:
     return view
 
 
+def marker_curve_picture(frames: int = 900) -> CurvePicture:
+    """Two markers with a gap that is previewed in two ways, and one that was filled."""
+    time, rng = np.arange(frames) / 60, np.random.default_rng(2)
+    plots, inks = [], [(0, 114, 178), (230, 159, 0)]
+    for title in "xyz":
+        lines = []
+        for label, ink in zip(("LKNE", "LANK"), inks):
+            truth = 300 * np.sin(2 * time + rng.uniform(0, 6)) + rng.uniform(-400, 400)
+            own, filled = truth.copy(), np.full(frames, np.nan)
+            own[400:440] = own[600:620] = np.nan
+            filled[599:621] = truth[599:621]
+            lines += [Line("raw", label, truth + rng.normal(0, 1, frames), ink), Line("body", label, truth + 12, ink)]
+            lines += [Line("measured", label, own, ink), Line("filled", label, filled, ink)]
+        for strong in (False, True):
+            course = truth[399:441] + (0 if strong else 30) * np.sin(np.linspace(0, np.pi, 42))
+            lines.append(Line("preview", "LANK", course, inks[1], 399, strong))
+        plots.append(CurvePlot(title, "mm", tuple(lines)))
+    shades = [Shade(400, 439, "gap", "LANK", inks[1], True), Shade(600, 619, "filled", "LANK", inks[1])]
+    shades += [Shade(700, 702, "outlier", "LKNE", inks[0])]
+    names = tuple(zip(("LKNE", "LANK"), inks))
+    return CurvePicture(time, tuple(plots), tuple(shades), names, "", frozenset(KIND_TITLES))
+
+
+def marker_curves() -> QWidget:
+    """With what stands beside them."""
+    editor = TrackEditor()
+    ways = [Way("rigid", "Rigid body of the neighbours", "0.8 mm"), Way("spline", "Spline", "2.4 mm")]
+    editor.set_gap("LANK, frames 400 to 439 (0.667 s)", [*ways, Way("body", "Fitted body", why_not="there is no fit")])
+    editor.set_proposals((ProposalRow("LKNE and LANK look exchanged from 4.2 s on.", "4.20 s", "proposed"),), "")
+    editor.histogram.set_lengths("LANK: 60 gaps", np.repeat([1, 3, 6, 20, 70], [30, 15, 8, 6, 1]), 60.0)
+    view = MarkerCurvesView(editor)
+    view.window_of_time.set_span(0.0, 15.0)
+    view.set_picture(marker_curve_picture())
+    view.window_of_time.set_time(7.0)
+    view.resize(1100, 430)
+    return view
+
+
 def convergence() -> QWidget:
     """Five candidates, of which the lowest is scrubbed."""
     iteration = np.unique(np.geomspace(1, 400, 90).astype(int)) - 1
@@ -172,6 +221,7 @@ def convergence() -> QWidget:
 
 
 EXAMPLES = {
+    "marker_curves": marker_curves,
     "curves": curves,
     "convergence": convergence,
     "timelines": timelines,

@@ -111,7 +111,7 @@ class TrackEditor(QTabWidget):
             for way in ways:
                 item = QTreeWidgetItem(self.ways, [way.title, way.error or ("cannot" if way.why_not else "…")])
                 item.setData(0, _NAME, way.name)
-                item.setTextAlignment(1, int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter))
+                item.setTextAlignment(1, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
                 item.setDisabled(bool(way.why_not))
                 tip = f"{way.help} Not here: {way.why_not}." if way.why_not else way.help
                 for column in range(2):
