@@ -1,7 +1,8 @@
 """How quick the widgets are on made-up sessions of full size: `python -m benchmarks.widgets`.
 
-10 minutes at 100 Hz with 60 markers for the timelines, 100 markers for the affinity view. Everything is drawn into
-memory; a step ends when its last pixel is painted. On a busy machine believe the processor's time, not the clock's.
+10 minutes at 100 Hz with 60 markers for the timelines, 4 for the marker curves, 100 markers for the affinity view.
+Everything is drawn into memory; a step ends when its last pixel is painted. On a busy machine believe the processor's
+time, not the clock's.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ def main() -> None:
     app = QApplication([])
     theme.apply(app, "light")
     print(f"{'ms':54s} {'median':>8s} {'p95':>8s} {'worst':>8s}   processor: {'median':>8s} {'p95':>8s}")
-    for name, step, times in [*timelines(app), *affinity(app), *angles(app), *table(app)]:
+    for name, step, times in [*timelines(app), *markers(app), *affinity(app), *angles(app), *table(app)]:
         report(name, step, times, app)
 
 
@@ -89,6 +90,45 @@ def timelines(app: object) -> list:
         ("timelines: the same, the whole again", whole, 12),
         ("timelines: cursor step", lambda k: shown.set_time(100 + 0.5 * k), 200),
         ("timelines: another selection", lambda k: shown.set_selected([k % MARKERS, 3]), 30),
+    ]
+
+
+def markers(app: object) -> list:
+    from markerscope.widgets import palette
+    from markerscope.widgets.plots.marker_curve_data import CurvePicture, CurvePlot, Line, Shade
+    from markerscope.widgets.plots.marker_curves import MarkerCurvesView
+
+    rng = np.random.default_rng(0)
+    inks = [tuple(int(c) for c in ink) for ink in palette.categorical(4)]
+    plots = []
+    for title in ("x", "y", "z"):
+        lines = []
+        for k, ink in enumerate(inks):
+            whole, raw = rng.standard_normal(FRAMES).cumsum(), np.full(FRAMES, np.nan)
+            raw[999::1000], raw[1000::1000] = whole[999::1000], whole[1000::1000] + 50
+            seen, filled = whole.copy(), np.full(FRAMES, np.nan)
+            for start in range(500, FRAMES, 1000):
+                seen[start : start + 30] = np.nan
+                filled[start - 1 : start + 31] = whole[start - 1 : start + 31]
+            lines += [Line(kind, f"M{k}", v, ink) for kind, v in (  # type: ignore[arg-type]
+                ("raw", raw), ("body", whole + 5), ("measured", seen), ("filled", filled))]  # fmt: skip
+        plots.append(CurvePlot(title, "mm", tuple(lines)))
+    shades = [Shade(s, s + 29, "filled", f"M{k}", ink) for k, ink in enumerate(inks) for s in range(500, FRAMES, 1000)]
+    names = tuple((f"M{k}", ink) for k, ink in enumerate(inks))
+    view = MarkerCurvesView()
+    view.resize(1100, 420)
+    view.window_of_time.set_span(0, FRAMES / RATE)
+    view.show()
+    picture = CurvePicture(np.arange(FRAMES) / RATE, tuple(plots), tuple(shades), names)
+    view.set_picture(picture)
+
+    def pan(width: float) -> Callable[[int], None]:
+        return lambda k: view.window_of_time.set_view(3.0 * (k % 60), 3.0 * (k % 60) + width)
+
+    return [
+        ("marker curves: 60,000 frames x 4 markers, pan at 5 min", pan(300), 40),
+        ("marker curves: the same, pan at 5 s", pan(5), 40),
+        ("marker curves: cursor step", lambda k: view.window_of_time.set_time(100 + 0.5 * (k % 4)), 100),
     ]
 
 

@@ -138,7 +138,10 @@ def _tracks(
     rate, own = work.measured.rate, work.measured.positions[:, m]
     found: list[Any] = []
     if looks.raw and m < work.raw.positions.shape[1]:
-        found.append(("raw", 0, derivative(work.raw.positions[:, m], rate, quantity), False))
+        raw = work.raw.positions[:, m]
+        other = _differs(raw, own)
+        if other.any():
+            found.append(("raw", 0, np.where(other[:, None], derivative(raw, rate, quantity), np.nan), False))
     if looks.body and placed is not None and m < placed.shape[1] and np.isfinite(placed[:, m]).any():
         found.append(("body", 0, derivative(placed[:, m], rate, quantity), False))
     found.append(("measured", 0, derivative(own, rate, quantity), False))
@@ -156,6 +159,15 @@ def _tracks(
                 start, values = _about(own, previewed, one.values, rate, quantity)
                 found.append(("preview", start, values, one.way == way))
     return found
+
+
+def _differs(raw: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """(T,) True where the file's samples are not the cleaned ones, and a frame to either side, so that lines meet."""
+    other = np.isfinite(raw).all(axis=1) & ~(raw == own).all(axis=1)
+    wide = other.copy()
+    wide[1:] |= other[:-1]
+    wide[:-1] |= other[1:]
+    return wide
 
 
 def _about(own: np.ndarray, gap: Gap, values: np.ndarray, rate: float, quantity: str) -> tuple[int, np.ndarray]:

@@ -59,7 +59,6 @@ class MarkerCurvesBinder(QObject):
         self._way = ""
         self._gap: Gap | None = None
         self._targets: tuple[Gap, ...] = ()
-        self._restored: object = None
         self._span: tuple[float, float] | None = None
         self._filling = Once(widget, self._fill)
         self._reasons = Once(widget, self._say_reasons)
@@ -139,7 +138,6 @@ class MarkerCurvesBinder(QObject):
     def _fill(self) -> None:
         if not self.widget.isVisible():
             return
-        self._restore()
         work, bench = self._work(), self.bench
         self.editor.set_proposals(views.proposal_rows(work), self._said_proposals(work))
         if work is None:
@@ -183,13 +181,6 @@ class MarkerCurvesBinder(QObject):
         self._histogram(work, chosen)
         self.widget.window_of_time.set_time(bench.clock.time)
         self._reasons.ask()
-
-    def _restore(self) -> None:
-        """Show what was shown when the session was left."""
-        folder = self.bench.document.folder if self.bench.document.is_open else None
-        if folder is not None and folder != self._restored:
-            self._restored = folder
-            self.widget.restore(self.bench.document.view.get("curves"))
 
     def _histogram(self, work: Working, chosen: list[int]) -> None:
         everyone = chosen or list(range(work.measured.positions.shape[1]))

@@ -38,5 +38,6 @@ def restore(window: MainWindow, view: dict[str, Any]) -> None:
     if isinstance(layout, str):
         with suppress(binascii.Error, ValueError):
             window.restoreState(QByteArray(base64.b64decode(layout, validate=True)), LAYOUT_VERSION)
+    window.curves.restore(view.get("curves"))
     if isinstance(opened, list):
         window.stages.set_open_cards(name for name in opened if isinstance(name, str))

@@ -81,7 +81,7 @@ class MarkerCurvePlots(QWidget):
         self._pressed = QPointF()
         self._from = 0.0
         window.viewed.connect(self._repaint)
-        window.moved.connect(lambda before, now: self.update())
+        window.moved.connect(self._move_cursor)
         window.ranged.connect(self.update)
 
     def set_picture(self, shown: CurvePicture) -> None:
@@ -147,6 +147,17 @@ class MarkerCurvePlots(QWidget):
         return QSize(round(18 * em(self)), round((max(len(self._shown.plots), 1) * _LEAST_EM + 1.3) * em(self)))
 
     # what is drawn
+
+    def _move_cursor(self, before: float, now: float) -> None:
+        """Draw anew only where the cursor was and is, and the values at it."""
+        areas, x, line = self.areas(), self.scale(), em(self)
+        if not areas:
+            return
+        for time in (before, now):
+            self.update(QRectF(x.at(time) - 3, 0, 6, self.height()).toAlignedRect())
+        for area in areas:
+            head = QRectF(area.left() + 6 * line, area.top() - 1.2 * line, area.width() - 6 * line + 8, 1.2 * line)
+            self.update(head.toAlignedRect())
 
     def _repaint(self) -> None:
         self._picture = None
@@ -251,11 +262,12 @@ class MarkerCurvePlots(QWidget):
         if len(time) < 2:
             return
         step = time[1] - time[0]
-        for shade in self._shown.shades:
-            start, end = time[0] + (shade.first - 0.5) * step, time[0] + (shade.last + 0.5) * step
-            if end < x.low or start > x.high:
-                continue
-            box = QRectF(x.at(start), area.top(), max(x.at(end) - x.at(start), 1.0), area.height())
+        ends = np.array([(s.first - 0.5, s.last + 0.5) for s in self._shown.shades]).reshape(-1, 2) * step + time[0]
+        inside = (ends[:, 1] >= x.low) & (ends[:, 0] <= x.high)
+        pixels = x.pixel(ends)
+        for k in np.flatnonzero(inside).tolist():
+            shade, (left, right) = self._shown.shades[k], pixels[k].tolist()
+            box = QRectF(left, area.top(), max(right - left, 1.0), area.height())
             ink = palette.OUTLIER if shade.kind == "outlier" else shade.colour
             painter.fillRect(box, colour(ink, _TINT.get(shade.kind, 40)))
             if shade.target:

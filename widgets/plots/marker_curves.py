@@ -21,7 +21,7 @@ OPTIONS: dict[str, tuple[str, bool, str]] = {
     "position": ("Position", True, "Where the markers are"),
     "velocity": ("Velocity", False, "Central difference of the positions; nothing is smoothed"),
     "acceleration": ("Acceleration", False, "Second difference of the positions; nothing is smoothed"),
-    "raw": ("Raw", True, "As the file has them, below the cleaned curves"),
+    "raw": ("Raw", True, "As the file has them, where the cleaned curves are other than that"),
     "filled": ("Filled", True, "Gaps as they were filled, or will be by the next cleaning"),
     "body": ("Body", True, "Where the fitted body has the markers"),
     "metres": ("m", False, "Metres instead of millimetres"),

@@ -66,7 +66,7 @@ def test_an_empty_panel_says_what_fills_it_and_a_selection_does(window: MainWind
     spin()
     shown = window.curves.plots.shown()
     assert [plot.title for plot in shown.plots] == ["x", "y", "z"]
-    assert {"raw", "measured", "body"} <= shown.kinds
+    assert {"measured", "body"} <= shown.kinds
     window.curves.options["acceleration"].click()
     window.curves.options["x"].click()
     window.curves.options["body"].click()
