@@ -188,6 +188,10 @@ class Workbench:
             return
         self.runner.cancel()
         self.clock.stop()
+        self.working.forget()
+        self.previews.ask(None, None, None)
+        for fills in self.pending:
+            fills.ask(None, frozenset())
         self._shown, self._reading, self._clusters, self._bones = {}, None, None, None
         self._to_restore = dict(self.document.view) if self.document.is_open else None
         if not self.document.is_open:

@@ -140,6 +140,10 @@ class WorkingTracks:
         self._stands_on: tuple[Any, ...] = ()
         self._now: Working | None = None
 
+    def forget(self) -> None:
+        """Let go of the trajectories of a session that is left."""
+        self._stands_on, self._now = (), None
+
     def now(self) -> Working | None:
         """The trajectories of now; None before the markers are read, or where the edits cannot be made on them."""
         board = self._board

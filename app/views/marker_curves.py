@@ -227,10 +227,10 @@ def heading_of(work: Working | None, chosen: Collection[int], targets: Sequence[
         return "No marker is selected. N goes to the next gap and selects its marker."
     if not targets:
         count = sum(len(work.of_marker.get(m, ())) for m in chosen)
-        whose = work.edited.labels[min(chosen)] if len(chosen) == 1 else f"the {len(chosen)} selected markers"
-        return f"Not in a gap. {whose} has {count} gap{'s' * (count != 1)}: N and Shift+N go through them.".replace(
-            "markers has", "markers have"
-        )
+        gaps = f"{count} gap{'s' * (count != 1)}"
+        if len(chosen) == 1:
+            return f"Not in a gap. {work.edited.labels[min(chosen)]} has {gaps}: N and Shift+N go through them."
+        return f"Not in a gap. The {len(chosen)} selected markers have {gaps}: N and Shift+N go through them."
     gap = targets[0]
     span = f"frame {gap.first}" if gap.length == 1 else f"frames {gap.first} to {gap.last}"
     seconds = gap.length / work.measured.rate

@@ -50,6 +50,7 @@ class TrackEditor(QTabWidget):
         self.setDocumentMode(True)
         self.heading = QLabel()
         self.heading.setWordWrap(True)
+        self.heading.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
         self.ways = _table("Ways to fill the gap", ["Fill by", "Expected error"])
         self.ways.currentItemChanged.connect(lambda now, before: self.way_shown.emit(self.way()))
         self.ways.itemActivated.connect(lambda item: self.asked.emit(f"fill.{self.way()}"))
