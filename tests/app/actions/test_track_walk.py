@@ -21,14 +21,14 @@ NAMES = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1])
 def test_random_edits_keep_every_sample_in_one_place(
     actions: Actions, solved: Workbench, said: list[Said], seed: int
 ) -> None:
     rng, done = np.random.default_rng(seed), 0
     before = solved.board.settings["clean"]
     columns = len(solved.board.current["markers"].labels)
-    for _ in range(150):
+    for _ in range(90):
         kind = rng.integers(4)
         if kind == 0:
             solved.clock.seek_marker_frame(int(rng.integers(0, 101)))
@@ -53,7 +53,7 @@ def test_random_edits_keep_every_sample_in_one_place(
             seen = work.edited.present[t]
             places = work.raw.positions[t, work.sources[t][seen]]
             assert np.array_equal(places, work.edited.positions[t, seen])
-    assert done > 40 and solved.board.settings["clean"] != before
+    assert done > 25 and solved.board.settings["clean"] != before
     while actions.trigger("edit.undo"):
         pass
     assert solved.board.settings["clean"] == before and solved.board.state("fit") == "cached"
