@@ -11,10 +11,27 @@ from markerscope.solver.core.request import Method
 
 def run_until(bench: Workbench, stage: str | None) -> None:
     """Have every stage down to one, or all, computing only what is missing; says so where there is nothing to do."""
-    names = bench.board.names
-    if not bench.runner.run(None if stage is None else names[: names.index(stage) + 1]):
+    board = bench.board
+    until = None
+    if stage is not None:
+        above = board.names[: board.names.index(stage) + 1]
+        runnable = board.runnable
+        until = [name for name in above if name == stage or name in runnable]
+    if not bench.runner.run(until):
         what = "All results are" if stage is None else f"Everything up to {title(stage)} is"
-        bench.say(Said("note", f"{what} there for these settings already"))
+        bench.say(Said("note", f"{what} there for these settings already", remedy=_left_out(bench, until)))
+    elif left := _left_out(bench, until):
+        bench.say(Said("note", "Only what the markers alone allow is computed", remedy=left))
+
+
+def _left_out(bench: Workbench, until: list[str] | None) -> str:
+    """Which of all stages a run of all leaves out, and why; empty where it leaves out none."""
+    board = bench.board
+    others = [name for name in board.names if name not in board.runnable] if until is None else []
+    problem = board.problem_of(others)
+    if problem is None:
+        return ""
+    return f"{title(others[0])} and {len(others) - 1} more stages wait, since {problem.what}"
 
 
 def run_stage(bench: Workbench, stage: str) -> None:
@@ -39,8 +56,17 @@ def _no_stage(bench: Workbench) -> str:
     return "" if bench.selection.stage in bench.board.names else "no stage is selected"
 
 
-def _problem(bench: Workbench) -> str:
-    return "" if bench.board.problem is None else str(bench.board.problem).rstrip(".")
+def lacking(bench: Workbench, stage: str | None = None) -> str:
+    """Why a stage, or any at all, cannot be run with the files there are; empty where it can."""
+    board = bench.board
+    if stage is None and board.runnable:
+        return ""
+    problem = board.problem_of(board.names if stage is None else [stage])
+    return "" if problem is None else str(problem).rstrip(".")
+
+
+def _selected_lacks(bench: Workbench) -> str:
+    return lacking(bench, bench.selection.stage)
 
 
 def _stop(bench: Workbench, asks: Asks) -> None:
@@ -65,11 +91,13 @@ def _method(method: Method, name: str, help: str) -> Action:
     return Action(f"method.{method}", name, "Run", help, run, why_not=why_not, checked=on)
 
 
-_READY = first(needs_session, needs_idle, _problem)
+_READY = first(needs_session, needs_idle)
 
 
 def _not_to_run(bench: Workbench, stage: str) -> str:
-    return _READY(bench) or ("" if stage in bench.board.names else "the method has no such stage")
+    if reason := _READY(bench):
+        return reason
+    return lacking(bench, stage) if stage in bench.board.names else "the method has no such stage"
 
 
 def _at(bench: Workbench, stage: str) -> str:
@@ -87,7 +115,15 @@ RUN_TO: ActionWith[str] = ActionWith(
 RUNS_WITH = (RUN_STAGE, RUN_TO)
 
 RUN_ACTIONS = (
-    Action("run.all", "Run all", "Run", "Have every result for the settings as they are.", _all, "F5 Ctrl+R", _READY),
+    Action(
+        "run.all",
+        "Run all",
+        "Run",
+        "Have every result for the settings as they are, the quick ones first.",
+        _all,
+        "F5 Ctrl+R",
+        first(_READY, lacking),
+    ),
     Action(
         "run.to",
         "Run to the selected stage",
@@ -95,7 +131,7 @@ RUN_ACTIONS = (
         "Compute what is missing of the stages down to the selected one.",
         _selected,
         "F6",
-        first(_READY, _no_stage),
+        first(_READY, _no_stage, _selected_lacks),
     ),
     Action(
         "run.stage",
@@ -104,7 +140,7 @@ RUN_ACTIONS = (
         "Compute the selected stage, once more if it is there, and what it needs only where that is missing.",
         _alone,
         "Shift+F6",
-        first(_READY, _no_stage),
+        first(_READY, _no_stage, _selected_lacks),
     ),
     Action("run.stop", "Stop", "Run", "Stop what runs; what is finished stays.", _stop, "Ctrl+.", _nothing_runs),
     _method("bundle", "Default method", "Fit by bundle adjustment with the video's landmarks."),

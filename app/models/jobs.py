@@ -25,6 +25,20 @@ _KNOWN_PART = 0.05
 
 
 @dataclass(frozen=True)
+class Plan:
+    """What a run would do.
+
+    Attributes
+    ----------
+    stages : that would be computed, in their order
+    seconds : s, about how long that takes
+    """
+
+    stages: tuple[str, ...]
+    seconds: float
+
+
+@dataclass(frozen=True)
 class Running:
     """How far the work is.
 
@@ -104,7 +118,8 @@ class Runner:
 
         Parameters
         ----------
-        until : the stages that are wanted; what they are computed from is computed where it is not there
+        until : the stages that are wanted; what they are computed from is computed where it is not there. None for all
+            that can be computed from the files there are
         again : those of them that are computed although they are there
 
         Raises
@@ -114,10 +129,8 @@ class Runner:
         if self._work is not None:
             raise InputError("stages are running already", remedy="wait for them, or stop them")
         self.board.refresh()
-        if self.board.problem is not None:
-            raise self.board.problem
         board, session = self.board, self.board.document.session
-        wanted = board.names if until is None else tuple(until)
+        wanted = self._wanted(until)
         parts = shares(board.graph, board.keys, session.store, wanted, again)
         if not parts:
             return False
@@ -126,6 +139,25 @@ class Runner:
         self._work.at = Running(text="starting", seconds_left=sum(self._work.expected.values()))
         self.changed.emit()
         return True
+
+    def plan(self, until: Collection[str] | None = None) -> Plan:
+        """What a run would do now.
+
+        Raises
+        ------
+        InputError : an input is not there
+        """
+        wanted, board = self._wanted(until), self.board
+        stages = shares(board.graph, board.keys, board.document.session.store, wanted)
+        return Plan(tuple(stages), sum(self._expected(stages).values()))
+
+    def _wanted(self, until: Collection[str] | None) -> tuple[str, ...]:
+        if until is None and self.board.runnable:
+            return self.board.runnable
+        wanted = self.board.names if until is None else tuple(until)
+        if (problem := self.board.problem_of(wanted)) is not None:
+            raise problem
+        return wanted
 
     def poll(self) -> bool:
         """Pass on what has arrived; to be called some twenty times a second while something runs.
@@ -213,7 +245,7 @@ class Runner:
         cost = {stage.name: stage.cost for stage in self.board.graph}
         rates = [took[name] / cost[name] for name in took if took[name] > 0.05]
         rate = median(rates) if rates else _GUESS_S
-        return {name: took.get(name, cost[name] * rate) for name in stages}
+        return {name: 0.0 if self.board.has_no_file(name) else took.get(name, cost[name] * rate) for name in stages}
 
     def _estimate(self) -> None:
         """The time left, from the time that the stage at work has taken and what is expected of it and the others."""

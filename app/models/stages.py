@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from markerscope.solver.core.errors import InputError
 from markerscope.solver.pipeline.methods import graph_of
 from markerscope.solver.pipeline.session import Session
 from markerscope.solver.pipeline.source import Source
-from markerscope.solver.pipeline.stage import Stage, State, stage_keys
+from markerscope.solver.pipeline.stage import Stage, State, leading_to, stage_keys
 from markerscope.solver.pipeline.stages import SOURCES
 from markerscope.solver.pipeline.store import Entry, Store
 
@@ -99,6 +99,10 @@ class Card:
     why_not: str = ""
 
 
+NEEDED = {"video_file": "a video", "prior_file": "a pose prior"}
+"""What a stage may need, in words."""
+
+
 class StageBoard:
     """The stages of the document's session.
 
@@ -107,7 +111,7 @@ class StageBoard:
     changed : emitted when anything about any stage may have changed
     results : of the session, whatever their settings; another object for another session
     compared : results that are shown beside those in force
-    problem : why the stages cannot be run, None if they can
+    problems : what is wrong with a file the session was made from, by the name of the source
     prepare : called in the background with a result that is loaded ahead, before it counts as loaded
     """
 
@@ -117,7 +121,7 @@ class StageBoard:
         self.prepare: Callable[[Ref, Any], None] = lambda ref, value: None
         self.results = Results(Store(Path()))
         self.compared: set[Ref] = set()
-        self.problem: InputError | None = None
+        self.problems: dict[str, InputError] = {}
         self.keys: dict[str, str] = {}
         self.sources: dict[str, Source] = {}
         self.settings: dict[str, Any] = {}
@@ -199,8 +203,32 @@ class StageBoard:
             fields=settings_of(stage, self.settings[stage], decided(self.document.session, stage)),
             earlier=tuple(self._earlier(stage, entry) for entry in entries),
             help=(own.run.__doc__ or "").strip().split("\n")[0],
-            why_not="" if self.problem is None else str(self.problem),
+            why_not="" if (problem := self.problem_of([stage])) is None else str(problem),
         )
+
+    def problem_of(self, stages: Iterable[str]) -> InputError | None:
+        """Why some stages cannot be run: a file that one of them needs is not there, or was never given."""
+        needed = leading_to(self.graph, [*stages])
+        for name, problem in self.problems.items():
+            if name in needed:
+                return problem
+        given = self.document.session.inputs.keys() if self.document.is_open else set[str]()
+        for stage in self.graph:
+            if stage.name in needed and stage.one_of and not given & set(stage.one_of):
+                what = " nor ".join(NEEDED[name] for name in stage.one_of)
+                return InputError(f"there is neither {what}", "the session", "add one of them")
+        return None
+
+    @property
+    def runnable(self) -> tuple[str, ...]:
+        """The stages that can be run with the files there are, in the order they are shown."""
+        return tuple(name for name in self.names if self.problem_of([name]) is None and not self.has_no_file(name))
+
+    def has_no_file(self, stage: str) -> bool:
+        """Whether a stage reads nothing but files that were not given, so that there is nothing for it to do."""
+        inputs = next(own.inputs for own in self.graph if own.name == stage)
+        given = self.document.session.inputs.keys()
+        return all(name in self.sources and name not in given for name in inputs)
 
     @property
     def cards(self) -> tuple[Card, ...]:
@@ -251,7 +279,7 @@ class StageBoard:
         if another:
             self.results.close()
             self.compared, self._failures, self._running = set(), {}, None
-            self.keys, self.sources, self.settings, self.graph, self.problem = {}, {}, {}, (), None
+            self.keys, self.sources, self.settings, self.graph, self.problems = {}, {}, {}, (), {}
             folder = self.document.folder if self.document.is_open else Path()
             self.results = Results(Store(folder / "results"), prepare=lambda ref, value: self.prepare(ref, value))
         if self.document.is_open:
@@ -268,7 +296,7 @@ class StageBoard:
         self._said.clear()
         self.graph = graph_of(session)
         self.settings = session.stage_settings(self.graph)
-        self.sources, self.problem = known_sources(session)
+        self.sources, self.problems = known_sources(session)
         self.keys = stage_keys(self.graph, self.sources, self.settings)
         regrouped(self.graph, self.keys, self.settings, self.results)
         self.compared = {ref for ref in self.compared if self.results.has(*_pair(ref))}
@@ -285,12 +313,12 @@ class StageBoard:
         return Earlier(entry.key, said, when, headline, current, ref in self.compared)
 
 
-def known_sources(session: Session) -> tuple[dict[str, Source], InputError | None]:
-    """The session's files as sources, and what is wrong with one, if something is.
+def known_sources(session: Session) -> tuple[dict[str, Source], dict[str, InputError]]:
+    """The session's files as sources, and what is wrong with those that cannot be read.
 
     A file that has gone is taken to hold what it held: what was computed from it can still be looked at.
     """
-    cache, found, problem = session.digests, dict[str, Source](), None
+    cache, found, problems = session.digests, dict[str, Source](), dict[str, InputError]()
     for name in SOURCES:
         given = session.inputs.get(name)
         try:
@@ -298,11 +326,9 @@ def known_sources(session: Session) -> tuple[dict[str, Source], InputError | Non
         except InputError as error:
             assert given is not None
             found[name] = Source(given.path, given.digest or "missing")
-            problem = problem or error
+            problems[name] = error
     cache.save()
-    if problem is None and not {"video_file", "prior_file"} & session.inputs.keys():
-        problem = InputError("there is neither a video nor a pose prior", "the session", "add one of them")
-    return found, problem
+    return found, problems
 
 
 def states_of(board: StageBoard) -> Mapping[str, State]:

@@ -99,8 +99,10 @@ class Workbench:
         self._clusters: np.ndarray | None = None
         self._bones: np.ndarray | None = None
         self._looked = 0.0
+        self._of: tuple[object, ...] | None = None
         self.document.changed.connect(self._document_changed)
         self.board.changed.connect(self._follow)
+        self.selection.changed.connect(self._chosen)
         self.runner.failed.connect(self._failed)
 
     @property
@@ -204,10 +206,34 @@ class Workbench:
         if another:
             self.opened.emit()
 
+    def _chosen(self, names: frozenset[str]) -> None:
+        """Note what a candidate or hypothesis that was selected is one of: a row of another result is another."""
+        if names & {"candidate", "hypothesis", "iteration"}:
+            self._of = self._search()
+
+    def _search(self) -> tuple[object, ...]:
+        """Which method, and which of its results the rows of candidates and hypotheses are of."""
+        latest = [self.board.latest(stage) for stage in ("localize", "solve", "orient")]
+        method = self.document.session.run.method if self.document.is_open else None
+        return (method, *(None if known is None else known[0] for known in latest))
+
+    def _leave_others(self) -> None:
+        """Let go of a row whose result is another now, as after a change of method."""
+        held = self._of is not None and self._of != self._search()
+        own = self.selection
+        if held and (own.candidate, own.hypothesis, own.iteration) != (None, None, None):
+            before, now = self._of, self._search()
+            assert before is not None
+            others = [a for a, b in zip(before, now) if a is not None and a != b]
+            if others:
+                own.select(candidate=None, hypothesis=None, iteration=None)
+        self._of = self._search()
+
     def _follow(self) -> None:
         """Have clock and selection stand on the results there are; those not in memory come later."""
         if not self.document.is_open:
             return
+        self._leave_others()
         self.board.results.loaded.connect(self._loaded)
         self.board.results.failed.connect(self._unread)
         if "markers" in self.board.keys and not self.runner.running:

@@ -212,8 +212,11 @@ def of_hypothesis(
 def of_chain(
     body: Body, found: PaperLocalization, row: int, prior: PosePrior, sync: Sync, markers: Markers
 ) -> BodyTrack:
-    """One of the chains that were laid over the markers: the whole body that it belongs to."""
-    chain = found.candidates[row]
+    """One of the chains that were laid over the markers: the whole body that it belongs to.
+
+    Of a chain that was not, the body that the solve starts from.
+    """
+    chain = found.candidates[row] if row < len(found.candidates) else found
     times = markers.time[found.frames]
     rotations = slerp(prior.rotations, prior.time, (times - sync.offset) / sync.rate_ratio)
     turn = exp_so3(np.array([0.0, 0.0, np.radians(chain.yaw_deg)])) @ R_LAB_UPRIGHT_CAMERA

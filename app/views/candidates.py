@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -11,7 +12,7 @@ import numpy as np
 from markerscope.app.views.bodies import BodyTrack
 from markerscope.app.views.colours import bone_name
 from markerscope.solver.core.markers import Markers
-from markerscope.solver.core.skeleton import subtrees
+from markerscope.solver.core.skeleton import JOINTS, subtrees
 from markerscope.solver.fit.confidence import same_answer
 from markerscope.solver.fit.counting import candidate_number
 from markerscope.solver.fit.parts import part_name
@@ -47,7 +48,8 @@ class CandidateRow(CandidateRecord):
 
     Attributes
     ----------
-    pool : its row in the localization: a hypothesis, or a chain; -1 for an answer that has none of its own
+    pool : its row in the localization: a hypothesis, or a chain (see ``chains_of``); -1 for an answer that has none of
+        its own
     candidate : its row in the orientation, by which it is pinned; -1 if it is not there
     can_pin : whether the fit can be told to go on from it
     """
@@ -104,7 +106,7 @@ def candidate_table(
         else row
         for row in rows
     )
-    return CandidateTable(marked, steps, score, unit, MEANING[score])
+    return CandidateTable(told_apart(marked), steps, score, unit, MEANING[score])
 
 
 def coverage(points: np.ndarray, markers: np.ndarray, within: float = 0.03) -> float:
@@ -256,19 +258,59 @@ def _chains(found: PaperLocalization, ranked: Orientation | None) -> tuple[Candi
                 distance=1000 * fit.one_way**0.5,
                 score=1e6 * fit.chamfer,
                 margin=fit.chamfer / max(found.candidates[order[0]].chamfer, 1e-12),
+                chain=int(row) + 1,
+                energy=fit.descent.energy,
             )
         )
-    for i in range(len(found.candidates), len(found.pruned)):
-        bones = found.pruned[i]
-        rows.append(CandidateRow(pool=i, fate="kept", part=part_of_bones(bones), bones=bone_names(bones)))
-    kept = {frozenset(int(j) for j in chain) for chain in found.pruned}
-    size = found.pruned.shape[1] if found.pruned.ndim == 2 else 0
-    if size:
-        for chain in subtrees(size):
-            if chain not in kept:
-                bones = np.array(sorted(chain))
-                rows.append(CandidateRow(fate="too alike", part=part_of_bones(bones), bones=bone_names(bones)))
+    first, last = len(found.candidates), len(found.pruned)
+    chains = chains_of(found)
+    like = _most_alike(chains[last:], chains[:last])
+    for i, chain in enumerate(chains[first:], first):
+        bones = np.array(sorted(chain))
+        rows.append(
+            CandidateRow(
+                pool=i,
+                fate="kept" if i < last else "too alike",
+                part=part_of_bones(bones),
+                bones=bone_names(bones),
+                chain=i + 1,
+                repeats=like[i - last] if i >= last else 0,
+            )
+        )
     return tuple(rows)
+
+
+def chains_of(found: PaperLocalization) -> tuple[frozenset[int], ...]:
+    """The bones of every chain: those that were kept, as the localization has them, then those that repeat one."""
+    kept = tuple(frozenset(int(j) for j in chain) for chain in found.pruned)
+    size = found.pruned.shape[1] if found.pruned.ndim == 2 else 0
+    known = set(kept)
+    return (*kept, *(chain for chain in subtrees(size) if chain not in known)) if size else kept
+
+
+def told_apart(rows: Sequence[CandidateRow]) -> tuple[CandidateRow, ...]:
+    """The rows with the bones that tell them apart: those that not every row has, of the fewest rows first."""
+    count = Counter(bone for row in rows for bone in row.bones)
+    return tuple(
+        replace(row, differs=tuple(sorted((b for b in row.bones if count[b] < len(rows)), key=lambda b: count[b])))
+        for row in rows
+    )
+
+
+def _most_alike(chains: Sequence[frozenset[int]], kept: Sequence[frozenset[int]]) -> tuple[int, ...]:
+    """Of each chain, the number of the kept one that it shares most bones with; 0 where none was kept."""
+    if not kept or not chains:
+        return (0,) * len(chains)
+    shared = _member(chains) @ _member(kept).T
+    return tuple(int(row) + 1 for row in shared.argmax(axis=1))
+
+
+def _member(chains: Sequence[frozenset[int]]) -> np.ndarray:
+    """(C, 24) 1 where a bone is in a chain."""
+    table = np.zeros((len(chains), len(JOINTS)), dtype=int)
+    for row, chain in enumerate(chains):
+        table[row, list(chain)] = 1
+    return table
 
 
 def _all(rows: Sequence[CandidateRow]) -> tuple[int, ...]:

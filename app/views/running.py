@@ -15,6 +15,7 @@ from markerscope.app.views.candidates import (
     bone_names,
     candidate_table,
     part_of_bones,
+    told_apart,
 )
 from markerscope.app.views.colours import rgb
 from markerscope.app.views.convergence import TracedCurve
@@ -40,7 +41,7 @@ def candidates_so_far(notes: Sequence[Found], found: Localization | None = None)
         rows = sorted((_of_chain(note) for note in chains), key=lambda row: row.score)
         wanted = int(chains[0].values["of"])
         step = SearchStep("Scored", f"{len(chains)} of {wanted} chains laid over the markers so far.", _all(rows))
-        return CandidateTable(_with_margin(rows), (step,), *CHAMFER, MEANING[CHAMFER[0]])
+        return CandidateTable(told_apart(_with_margin(rows)), (step,), *CHAMFER, MEANING[CHAMFER[0]])
     ranked = {index: note for (kind, index), note in latest.items() if kind == "candidate"}
     if not ranked or found is None:
         return None
@@ -54,7 +55,7 @@ def candidates_so_far(notes: Sequence[Found], found: Localization | None = None)
         replace(plain.steps[1], rows=scored),
         replace(plain.steps[3], rows=refined),
     )
-    return CandidateTable(_with_margin(rows), steps, plain.score, plain.unit, plain.meaning)
+    return CandidateTable(told_apart(_with_margin(rows)), steps, plain.score, plain.unit, plain.meaning)
 
 
 def curves_so_far(notes: Sequence[Found]) -> tuple[TracedCurve, ...]:
@@ -88,6 +89,8 @@ def _of_chain(note: Found) -> CandidateRow:
         yaw_deg=float(note.values["yaw_deg"]),
         distance=1000 * float(note.values["one_way"]) ** 0.5,
         score=1e6 * float(note.values["chamfer"]),
+        chain=note.index + 1,
+        energy=float(note.values.get("energy", np.nan)),
     )
 
 

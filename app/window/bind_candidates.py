@@ -40,6 +40,7 @@ class CandidatesBinder:
         widget.row_activated.connect(self._chosen)
         widget.pin_requested.connect(self._pin)
         widget.step_chosen.connect(self._to_step)
+        widget.rows_kept.connect(self._leave_hidden)
 
     def fill(self) -> None:
         """Show what is known."""
@@ -83,6 +84,8 @@ class CandidatesBinder:
         found, ranked = self.shown.get("localize"), self.shown.get("orient")
         if found is None:
             return None
+        if not self.shown.made_from("orient", "localize"):
+            ranked = None  # of another search, or of another method
         in_use = None
         if ranked is not None:
             in_use = self._pinned() or 0
@@ -109,6 +112,12 @@ class CandidatesBinder:
     def _to_step(self, name: str) -> None:
         self._step = name
 
+    def _leave_hidden(self) -> None:
+        """Let go of a row that is not shown any more: P would hold what nobody sees."""
+        chosen = self._row_selected()
+        if chosen >= 0 and chosen not in self.widget.table.shown_rows():
+            self.bench.selection.select(candidate=None, hypothesis=None)
+
     def _chosen(self, row: int) -> None:
         if self._table is None or not 0 <= row < len(self._table.rows):
             return
@@ -123,16 +132,20 @@ class CandidatesBinder:
             self._choosing = False
 
     def _select(self) -> None:
-        if self._table is None or self._choosing:
-            return
+        if self._table is not None and not self._choosing:
+            self.widget.set_selected(self._row_selected())
+
+    def _row_selected(self) -> int:
+        """The row of the table that is what is selected, -1 for none."""
+        if self._table is None:
+            return -1
         chosen, pool = self.bench.selection.candidate, self.bench.selection.hypothesis
         rows = self._table.rows
-        place = -1
         if chosen is not None:
-            place = next((i for i, row in enumerate(rows) if row.candidate == chosen), -1)
-        elif pool is not None:
-            place = next((i for i, row in enumerate(rows) if row.pool == pool), -1)
-        self.widget.set_selected(place)
+            return next((i for i, row in enumerate(rows) if row.candidate == chosen), -1)
+        if pool is not None:
+            return next((i for i, row in enumerate(rows) if row.pool == pool), -1)
+        return -1
 
     def _pin(self, row: int) -> None:
         if self._table is None or not 0 <= row < len(self._table.rows):

@@ -14,7 +14,7 @@ from markerscope.app.views.bodies import BodyTrack
 from markerscope.app.views.colours import RGB, Legend
 from markerscope.app.views.posing import BONE_EDGES
 from markerscope.app.views.tracks import MarkerTracks
-from markerscope.app.window.ghosts import Ghosts
+from markerscope.app.window.ghosts import Ghost, Ghosts
 from markerscope.app.window.keys import how
 from markerscope.app.window.once import Once
 from markerscope.app.window.shown import Shown
@@ -192,7 +192,7 @@ class SceneBinder:
         for name, ghost in here.items():
             vertices = ghost.track.vertices(time, "coarse")
             self.widget.set_mesh(name, vertices, ghost.track.faces("coarse"), ghost.colour, ghost.opacity)
-            self.widget.set_bones(f"{name} bones", ghost.track.joints(time), BONE_EDGES, ghost.colour)
+            self.widget.set_bones(f"{name} bones", ghost.track.joints(time), BONE_EDGES, _standing_out(ghost))
         self._ghost_layers = set(here)
 
     def _ghosts_on(self) -> bool:
@@ -293,6 +293,15 @@ def _held(held: Qt.KeyboardModifier) -> bool:
 def _box_how(held: Qt.KeyboardModifier) -> Any:
     """Shift draws the box, so it alone replaces; with Ctrl it adds."""
     return "add" if held & Qt.KeyboardModifier.ControlModifier else "replace"
+
+
+def _standing_out(ghost: Ghost) -> Any:
+    """A ghost's colour for the bones that carry the markers, and a faint grey for the others."""
+    carrying = np.isin(BONE_EDGES[:, 0], list(ghost.bones))
+    if not carrying.any():
+        return ghost.colour
+    faint = np.array(theme.colours().grid, dtype=np.uint8)
+    return np.where(carrying[:, None], np.array(ghost.colour, dtype=np.uint8), faint)
 
 
 def _striped(bands: np.ndarray) -> np.ndarray:

@@ -2,31 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from PySide6.QtCore import QTimer
 
 from markerscope.app.actions import Actions
+from markerscope.app.actions.candidate_actions import pinned
 from markerscope.app.actions.edit_actions import COMPARE, GO_BACK, SET_VALUE, Compared, Value
 from markerscope.app.actions.run_actions import RUN_STAGE, RUN_TO
 from markerscope.app.models.fields import title
 from markerscope.app.models.jobs import Running
 from markerscope.app.models.results import Ref
+from markerscope.app.models.stages import Card
 from markerscope.app.models.workbench import Workbench
+from markerscope.app.window.concerned import Concerned
+from markerscope.solver.pipeline.stage import leading_to
+from markerscope.solver.report.headlines import said_pinned
 from markerscope.widgets.panels.progress_strip import ProgressStrip
-from markerscope.widgets.panels.stage_data import StageProgress
+from markerscope.widgets.panels.stage_data import StageData, StageProgress
 from markerscope.widgets.panels.stage_panel import StagePanel
 
 
 class StagesBinder:
     """Cards and the progress at the foot of the window."""
 
-    def __init__(self, panel: StagePanel, strip: ProgressStrip, bench: Workbench, table: Actions) -> None:
-        self.panel, self.strip, self.bench, self.table = panel, strip, bench, table
+    def __init__(
+        self, panel: StagePanel, strip: ProgressStrip, bench: Workbench, concerned: Concerned, table: Actions
+    ) -> None:
+        self.panel, self.strip, self.bench, self.concerned, self.table = panel, strip, bench, concerned, table
         self._stage = ""
         self._filling = QTimer(panel, singleShot=True, interval=0)  # many changes at once are shown once
         self._filling.timeout.connect(self._fill)
         bench.board.changed.connect(self.fill)
+        concerned.changed.connect(self.fill)
+        panel.check_chosen.connect(self._to_check)
         bench.runner.changed.connect(self._ran)
         bench.runner.progressed.connect(self._progress)
         panel.run.connect(lambda name: table.do(RUN_STAGE, name))
@@ -43,10 +50,35 @@ class StagesBinder:
         self._filling.start()
 
     def _fill(self) -> None:
-        cards = [
-            replace(card, why_not=self.table.why_not_with(RUN_STAGE, card.name)) for card in self.bench.board.cards
-        ]
-        self.panel.set_stages(cards)  # type: ignore[arg-type]  # cards have what the panel reads
+        self.panel.set_stages([self._card(card) for card in self.bench.board.cards])
+
+    def _card(self, card: Card) -> StageData:
+        checks = tuple(concern.text for concern in self.concerned.of(card.name)) if card.state == "cached" else ()
+        return StageData(
+            card.name,
+            card.title,
+            "check" if checks else card.state,
+            card.seconds,
+            card.headline,
+            card.fields,  # type: ignore[arg-type]  # they have what the panel reads
+            card.earlier,  # type: ignore[arg-type]
+            card.help,
+            self.table.why_not_with(RUN_STAGE, card.name),
+            checks,
+            self._note(card),
+        )
+
+    def _note(self, card: Card) -> str:
+        """What a result rests on that was pinned by hand; the fit itself says so among what is to check."""
+        held = pinned(self.bench)
+        after = "fit" in leading_to(self.bench.board.graph, [card.name]) - {card.name}
+        words = said_pinned(held) if after and card.state == "cached" else ""
+        return f"{words[:1].upper()}{words[1:]}"
+
+    def _to_check(self, stage: str, row: int) -> None:
+        own = self.concerned.of(stage)
+        if 0 <= row < len(own):
+            self.concerned.go_to(own[row])
 
     def _ran(self) -> None:
         if not self.bench.runner.running:

@@ -12,7 +12,7 @@ from markerscope.app.models.signal import Signal
 from markerscope.app.models.workbench import Workbench
 from markerscope.app.views import bodies
 from markerscope.app.views.bodies import BodyTrack
-from markerscope.app.views.candidates import part_of_bones
+from markerscope.app.views.candidates import chains_of, part_of_bones
 from markerscope.app.views.colours import RGB, rgb
 from markerscope.app.views.convergence import TracedCurve
 from markerscope.app.window.shown import Shown
@@ -32,6 +32,7 @@ class Ghost:
     name : of its layer
     title : what it is, in words for the legend
     track, colour, opacity : see there
+    bones : those that carry the markers, which stand out from the others; empty where all are alike
     """
 
     name: str
@@ -39,6 +40,7 @@ class Ghost:
     track: BodyTrack
     colour: tuple[int, int, int]
     opacity: float = 0.35
+    bones: frozenset[int] = frozenset()
 
 
 class Ghosts:
@@ -91,10 +93,10 @@ class Ghosts:
             name = f"compared {ref.key}"
             track = self.shown.once(name, (motion,), partial(bodies.of_motion, self.shown.body, motion))
             found.append(Ghost(name, self._said(ref.key), track, rgb(palette.categorical(place + 1)[place])))
-        before = [(ghost.name, ghost.title, ghost.track) for ghost in self.all]
+        before = [(ghost.name, ghost.title, ghost.track, ghost.bones) for ghost in self.all]
         self.replaces_body = own is not None and self._iteration is not None
         self.all = tuple(found)
-        if before != [(ghost.name, ghost.title, ghost.track) for ghost in found]:
+        if before != [(ghost.name, ghost.title, ghost.track, ghost.bones) for ghost in found]:
             self.changed.emit()
 
     def _said(self, key: str) -> str:
@@ -133,7 +135,8 @@ class Ghosts:
             chosen = self.bench.selection.candidate or 0
             title = f"Candidate {candidate_number(chosen)}: {self.shown.get('orient').candidates[chosen].part}"
             title += self._dated("localize", "orient")
-            return Ghost("candidate", title, track, _colour(chosen))
+            carrying = self.shown.get("orient").candidates[chosen].bone
+            return Ghost("candidate", title, track, _colour(chosen), bones=_set(carrying))
         found, prior, sync = (self.shown.get(name) for name in ("localize", "prior", "sync"))
         row, markers = self.bench.selection.hypothesis, self.shown.markers
         if row is None or markers is None or found is None or prior is None or sync is None:
@@ -144,12 +147,17 @@ class Ghosts:
             bones = found.bone[row]
             track = bodies.of_hypothesis(self.shown.body, found, row, prior, sync, markers)
         else:
-            if row >= len(found.candidates):
+            chains = self.shown.once("chains", (found,), lambda: chains_of(found))
+            if row >= len(chains):
                 return None
-            bones = found.candidates[row].bones
+            bones = np.array(sorted(chains[row]))
             track = bodies.of_chain(self.shown.body, found, row, prior, sync, markers)
+            name = f"Chain {row + 1}: {part_of_bones(bones)}"
+            title = name if row < len(found.candidates) else f"{name}, not laid over the markers"
+            title += self._dated("localize", "prior", "sync")
+            return Ghost("hypothesis", title, track, _colour(row), bones=_set(bones))
         title = f"Hypothesis: {part_of_bones(bones)}{self._dated('localize', 'prior', 'sync')}"
-        return Ghost("hypothesis", title, track, _colour(row))
+        return Ghost("hypothesis", title, track, _colour(row), bones=_set(bones))
 
     def candidate_track(self, row: int | None = None) -> BodyTrack | None:
         """The body of a candidate, the selected one by default."""
@@ -163,6 +171,10 @@ class Ghosts:
         return self.shown.once(
             f"candidate {row}", (own, found, markers), lambda: bodies.of_candidate(self.shown.body, own, found, markers)
         )
+
+
+def _set(bones: np.ndarray) -> frozenset[int]:
+    return frozenset(int(j) for j in bones if j >= 0)
 
 
 def _colour(row: int) -> RGB:

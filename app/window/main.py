@@ -20,6 +20,7 @@ from markerscope.app.window.bind_angles import AnglesBinder
 from markerscope.app.window.bind_candidates import CandidatesBinder
 from markerscope.app.window.bind_convergence import ConvergenceBinder
 from markerscope.app.window.bind_dated import DatedBinder
+from markerscope.app.window.bind_glance import GlanceBinder
 from markerscope.app.window.bind_history import HistoryBinder
 from markerscope.app.window.bind_hypotheses import HypothesesBinder
 from markerscope.app.window.bind_marker_curves import MarkerCurvesBinder
@@ -33,6 +34,7 @@ from markerscope.app.window.bind_transport import TransportBinder
 from markerscope.app.window.bind_video import VideoBinder
 from markerscope.app.window.bind_welcome import WelcomeBinder
 from markerscope.app.window.collecting import Collecting
+from markerscope.app.window.concerned import Concerned
 from markerscope.app.window.docks import Docks, Panel
 from markerscope.app.window.ghosts import Ghosts
 from markerscope.app.window.group_menu import SceneMenu
@@ -41,6 +43,7 @@ from markerscope.app.window.remembering import parts_of, restore
 from markerscope.app.window.shown import Shown
 from markerscope.app.window.videos import is_video
 from markerscope.widgets.panels.dated import Dated
+from markerscope.widgets.panels.glance_bar import GlanceBar
 from markerscope.widgets.panels.history import HistoryList
 from markerscope.widgets.panels.hypotheses import HypothesesView
 from markerscope.widgets.panels.message_bar import MessageBar
@@ -110,6 +113,7 @@ class MainWindow(QMainWindow):
         self.scene, self.video, self.timelines = Scene3D(), VideoView(), Timelines()
         self.scene_bar = make_bar(self.table)
         self.stages, self.transport, self.messages = StagePanel(), Transport(), MessageBar()
+        self.glance = GlanceBar()
         self.affinity, self.pair = AffinityView(), PairPlot()
         self.candidates, self.hypotheses = CandidateTable(), HypothesesView()
         self.convergence, self.markers, self.angles = ConvergenceView(), MarkerTable(), CurvesView()
@@ -138,7 +142,13 @@ class MainWindow(QMainWindow):
         self.docks = Docks(
             self,
             [
-                Panel("stages", "Stages", self.stages, _LEFT, "Every stage: its state, settings and results"),
+                Panel(
+                    "stages",
+                    "Stages",
+                    _column(self.glance, self.stages),
+                    _LEFT,
+                    "Every stage: its state, settings and results",
+                ),
                 Panel("history", "History", self.history, _LEFT, "Every decision, to go back to"),
                 Panel("video", "Video", dated["video"], _RIGHT, "The frame of the clock's time"),
                 Panel("affinity", "Affinity", dated["affinity"], _RIGHT, "Who moves rigidly with whom"),
@@ -160,12 +170,14 @@ class MainWindow(QMainWindow):
             self.curves, self.track_editor, self.timelines, bench, shown, self.table
         )
         self.scene_menu = SceneMenu(self.scene, bench, shown, self.table)
+        self.concerned = Concerned(self, bench, shown, self.raise_dock)
         self.binders = [
             scene,
             SceneBarBinder(self.scene_bar, self.scene, bench, self.table),
             self.video_binder,
             TimelinesBinder(self.timelines, bench, shown, ghosts, self.table),
-            StagesBinder(self.stages, self.progress, bench, self.table),
+            StagesBinder(self.stages, self.progress, bench, self.concerned, self.table),
+            GlanceBinder(self.glance, bench, shown, self.concerned, self.table),
             TransportBinder(self.transport, bench, self.table),
             MessagesBinder(self.messages, bench),
             AffinityBinder(self.affinity, self.pair, bench, shown, scene, self.table),
@@ -312,5 +324,5 @@ def _column(*widgets: QWidget) -> QWidget:
     layout.setContentsMargins(0, 0, 0, 0)
     layout.setSpacing(0)
     for widget in widgets:
-        layout.addWidget(widget, 1 if isinstance(widget, Scene3D | QStackedWidget | AffinityView) else 0)
+        layout.addWidget(widget, 1 if isinstance(widget, Scene3D | QStackedWidget | AffinityView | StagePanel) else 0)
     return made

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 WANTED = (
     "markers", "clean", "landmarks", "prior", "sync", "segment", "localize", "solve", "orient", "fit", "neutral",
-    "angles", "check",
+    "angles", "surface", "check",
 )  # fmt: skip
 
 
@@ -154,6 +154,14 @@ class Shown:
         """Key of what is shown of a stage."""
         ref = self._refs.get(stage)
         return None if ref is None else ref.key
+
+    def made_from(self, stage: str, other: str) -> bool:
+        """Whether what is shown of a stage was computed from what is shown of another."""
+        own, given = self._refs.get(stage), self._refs.get(other)
+        if own is None or given is None:
+            return False
+        entry = self.bench.board.results.entry(own.stage, own.key)
+        return entry is not None and entry.about.get("inputs", {}).get(other) == given.key
 
     def out_of_date(self, stages: Iterable[str]) -> tuple[str, ...]:
         """Those of some stages that are shown, and are not what the settings ask for."""

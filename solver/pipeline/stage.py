@@ -47,7 +47,9 @@ class Stage:
     result : type of the result, a frozen dataclass or an annotation such as ``Landmarks | None``
     headline : one line about a result
     shipped : files of the program itself that it reads: another content makes another result
-    cost : how long it takes beside the other stages, in any unit; only the progress bar believes it
+    cost : how long it takes beside the other stages, in any unit; the quicker of two that do not wait for each other
+        runs first
+    one_of : sources of which at least one has to be given; none where the stage can do without
 
     Raises
     ------
@@ -63,6 +65,7 @@ class Stage:
     headline: Callable[[Any], str] = lambda result: ""
     cost: float = 1.0
     shipped: tuple[Path, ...] = ()
+    one_of: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a function of other inputs as soon as the module of the stage is imported."""
@@ -207,7 +210,7 @@ def run_graph(
     store.clean()
     runner.again = frozenset(again)
     runner.shares = shares(graph, keys, store, wanted, again)
-    for name in wanted:
+    for name in (*runner.shares, *wanted):
         runner.ensure(name)
     progress(1.0, "done")
     return GraphRun(keys, runner.events, runner.value)
@@ -228,6 +231,38 @@ def shares(
     wanted : the stages whose results are wanted
     again : those of them that are computed although they are there
     """
+    missing = _missing(graph, keys, store, wanted, again)
+    stages = {stage.name: stage for stage in graph}
+    total = sum(stages[name].cost for name in missing) or 1.0
+    found: dict[str, tuple[float, float]] = {}
+    done = 0.0
+    for name in _quick_first(missing, stages, keys):
+        found[name] = done / total, (done + stages[name].cost) / total
+        done += stages[name].cost
+    return found
+
+
+def leading_to(graph: Sequence[Stage], wanted: Collection[str]) -> frozenset[str]:
+    """The stages and sources that some stages are computed from, in one step or many, with these stages themselves."""
+    stages = {stage.name: stage for stage in graph}
+    found: set[str] = set()
+    frontier = list(wanted)
+    while frontier:
+        name = frontier.pop()
+        if name not in found:
+            found.add(name)
+            frontier += stages[name].inputs if name in stages else ()
+    return frozenset(found)
+
+
+def _missing(
+    graph: Sequence[Stage],
+    keys: Mapping[str, str],
+    store: Store,
+    wanted: Collection[str],
+    again: Collection[str],
+) -> set[str]:
+    """The stages that have to be computed for these to be there."""
     stages = {stage.name: stage for stage in graph}
     missing: set[str] = set()
     frontier = list(wanted)
@@ -238,14 +273,26 @@ def shares(
         if name in again or not store.has(name, keys[name]):
             missing.add(name)
             frontier += stages[name].inputs
-    total = sum(stages[name].cost for name in missing) or 1.0
-    found: dict[str, tuple[float, float]] = {}
-    done = 0.0
-    for name in keys:
-        if name in missing:
-            found[name] = done / total, (done + stages[name].cost) / total
-            done += stages[name].cost
-    return found
+    return missing
+
+
+def _quick_first(missing: Collection[str], stages: Mapping[str, Stage], keys: Mapping[str, str]) -> list[str]:
+    """The stages that must run, each after those it waits for, and what is there soonest first.
+
+    What can be looked at early (how the markers are grouped) does not wait for what takes long (watching the video).
+    """
+    order: list[str] = []
+
+    def needs(name: str) -> list[str]:
+        leading = leading_to(list(stages.values()), [name])
+        return [other for other in keys if other in leading and other in missing]
+
+    def soonest(name: str) -> float:
+        return sum(stages[other].cost for other in needs(name))
+
+    for name in sorted((name for name in keys if name in missing), key=soonest):
+        order += [other for other in needs(name) if other not in order]
+    return order
 
 
 @dataclass(frozen=True)

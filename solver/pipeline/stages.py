@@ -117,7 +117,17 @@ GRAPH = (
         _said_landmarks,
         cost=16,
     ),
-    Stage("prior", 2, PriorSettings, ("prior_file", "landmarks"), inputs.pose_prior, PosePrior, cost=2, shipped=BODY),
+    Stage(
+        "prior",
+        2,
+        PriorSettings,
+        ("prior_file", "landmarks"),
+        inputs.pose_prior,
+        PosePrior,
+        cost=2,
+        shipped=BODY,
+        one_of=("video_file", "prior_file"),
+    ),
     Stage(
         "sync",
         1,

@@ -9,6 +9,7 @@ from pathlib import Path
 from markerscope.resources import resource
 from markerscope.solver.fit.counting import candidate_number
 from markerscope.solver.io.atomic import write_text_atomic
+from markerscope.solver.report.headlines import TIE
 from markerscope.solver.report.report_data import ReportData
 from markerscope.solver.report.report_svg import affinity_cap, affinity_legend, affinity_plot, angle_plot, gaps_plot
 
@@ -65,7 +66,7 @@ def _margin(margin: float) -> str:
     if not math.isfinite(margin):
         return "No different answer was found to compare with."
     excess = (margin - 1) * 100
-    if margin < 1.15:
+    if margin < TIE:
         return f"The best different answer costs only {excess:.0f} % more: the two are close to a tie."
     if margin < 2:
         return f"The best different answer costs {excess:.0f} % more."

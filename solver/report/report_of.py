@@ -14,18 +14,18 @@ from markerscope.solver.clustering.segment import Segmentation
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.skeleton import BONES, JOINTS
-from markerscope.solver.fit.pull.results import EARNED, LandmarkPull, words_of
+from markerscope.solver.fit.pull.results import words_of
 from markerscope.solver.fit.results import FittedMotion, Orientation
 from markerscope.solver.pipeline.doubts import doubts
 from markerscope.solver.pipeline.names import ANGLES, CHECK, CLEAN, FIT, ORIENT, PRIOR, SEGMENT, SURFACE, SYNC
 from markerscope.solver.pipeline.session import Session
 from markerscope.solver.pipeline.stage import GraphRun
+from markerscope.solver.report.headlines import headlines, said_pinned
 from markerscope.solver.report.report import write_report
 from markerscope.solver.report.report_data import (
     AngleCurve,
     Gaps,
     Groups,
-    Headline,
     Hypothesis,
     InputFile,
     Picture,
@@ -81,11 +81,14 @@ def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str,
         for name, row in about["stages"].items()
     )
     marker_file = session.inputs["marker_file"].path
+    pinned = about["stages"]["fit"]["settings"].get("candidate")
+    stands_on = f", {said_pinned(pinned)}" if pinned is not None else ""
+    part = ranked.candidates[motion.chosen].part
     filled = np.zeros(markers.present.shape, bool) if named.filled is None else named.filled
     return ReportData(
         title=marker_file.stem,
-        subtitle=f"{ranked.candidates[motion.chosen].part}, {len(motion.time)} frames at {markers.rate:g} Hz",
-        headlines=_headlines(graph, motion, ranked),
+        subtitle=f"{part}, {len(motion.time)} frames at {markers.rate:g} Hz{stands_on}",
+        headlines=headlines(graph[SYNC], ranked, motion, graph[SURFACE], graph[CHECK], pinned),
         warnings=doubts(graph),
         inputs=inputs,
         groups=_groups(markers, graph[SEGMENT]),
@@ -106,35 +109,6 @@ def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str,
         stages=stages,
         versions=_versions(about),
     )
-
-
-def _headlines(graph: GraphRun, motion: FittedMotion, ranked: Orientation) -> tuple[Headline, ...]:
-    sync, surface = graph[SYNC], graph[SURFACE]
-    margin = f"next answer costs {ranked.margin:.2f} times" if np.isfinite(ranked.margin) else "no other answer found"
-    camera = motion.camera
-    rows = [
-        Headline("Confidence", f"{100 * graph[CHECK].confidence:.0f} %", margin),
-        Headline("Marker residual", f"{1000 * np.nanmedian(motion.residual):.1f} mm", "median distance from its place"),
-        Headline("Marker to skin", f"{1000 * surface.mean:.1f} mm", "mean; a marker's centre stands some 9.5 mm off"),
-        Headline(
-            "Sync offset", f"{sync.offset:+.3f} s", f"added to the video's time; confidence {sync.confidence:.2f}"
-        ),
-    ]
-    if np.isfinite(camera.reprojection_px):
-        rows.append(
-            Headline("Reprojection", f"{camera.reprojection_px:.0f} px", "median distance of the video's landmarks")
-        )
-    if motion.pull is not None:
-        rows.append(_landmarks(motion.pull))
-    return tuple(rows)
-
-
-def _landmarks(pull: LandmarkPull) -> Headline:
-    value = f"{pull.hits} markers" if pull.state in ("earned", "by hand") else pull.state
-    note = "drawn to the landmarks that they sit on"
-    if np.isfinite(pull.log_ratio):
-        note += f"; log likelihood ratio {pull.log_ratio:.1f}, needs {EARNED:.1f}"
-    return Headline("Bony landmarks", value, note)
 
 
 def _groups(markers: Markers, found: Segmentation) -> Groups:

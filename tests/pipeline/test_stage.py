@@ -13,7 +13,16 @@ import pytest
 from markerscope.solver.core.errors import Cancelled, InputError
 from markerscope.solver.core.progress import Found, part_of, tell
 from markerscope.solver.pipeline.source import Source
-from markerscope.solver.pipeline.stage import Event, NoSettings, Stage, run_graph, shares, stage_keys, stage_states
+from markerscope.solver.pipeline.stage import (
+    Event,
+    NoSettings,
+    Stage,
+    leading_to,
+    run_graph,
+    shares,
+    stage_keys,
+    stage_states,
+)
 from markerscope.solver.pipeline.store import Store
 
 
@@ -229,3 +238,14 @@ def test_only_what_has_to_run_takes_the_bar(tmp_path: Path) -> None:
     assert shares(graph, keys, work.store, ["double"]).keys() == {"read", "double"}
     run_graph(graph, work.sources, {}, work.store, until=["double"])
     assert shares(graph, keys, work.store, ["join"]).keys() == {"total", "join"}
+
+
+def test_what_is_quick_does_not_wait_for_what_is_slow(work: Work) -> None:
+    slow = replace(work.stage("watch", ("file",), lambda i, s: np.ones(1)), cost=16.0)
+    after = work.stage("place", ("watch", "double"), lambda i, s: i["double"].values)
+    work.graph = (slow, after, *work.graph)
+    assert work.go() == ["double", "join", "place", "read", "total", "watch"]
+    assert work.ran.index("join") < work.ran.index("watch") < work.ran.index("place")
+    order = list(shares(work.graph, stage_keys(work.graph, work.sources, {}), work.store, ["join"], again=["join"]))
+    assert order == ["join"]
+    assert leading_to(work.graph, ["place"]) == {"place", "watch", "double", "read", "file", "extra"}

@@ -54,13 +54,15 @@ def test_every_card_says_how_it_stands(panel: StagePanel) -> None:
     for stage in STAGES:
         said = texts(panel.card(stage.name))
         assert stage.title in said
-        assert ("out of date" if stage.state == "stale" else stage.state) in said
+        words = {"stale": "out of date", "cached": "done", "not run": "to do", "check": "to check"}
+        assert words.get(stage.state, stage.state) in said
+        assert all(text in said for text in stage.checks)
         assert stage.headline in said
 
 
 def test_the_state_is_drawn_in_its_colour(panel: StagePanel) -> None:
     look = theme.colours()
-    for name, ink in (("markers", look.good), ("clean", look.warning), ("fit", look.error)):
+    for name, ink in (("markers", look.good), ("sync", look.warning), ("fit", look.error)):
         assert distance(pixels(panel.card(name)), ink).min() <= 4, name
 
 

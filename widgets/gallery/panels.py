@@ -36,6 +36,10 @@ STAGES = (
         ),
         help="Groups markers that move rigidly together",
     ),
+    StageData(
+        "sync", "Synchronisation", "check", 0.4, "marker time = video time -8.000 s",
+        checks=("The offset is not sure (confidence 0.00).",),
+    ),
     StageData("orient", "Orientation", "running", None, "", why_not="stages are running; wait for them, or stop them"),
     StageData(
         "fit", "Fit", "failed", 3.2,

@@ -23,15 +23,17 @@ from markerscope.widgets.allow import allow
 from markerscope.widgets.icons import icon
 from markerscope.widgets.panels.bar import show_part
 from markerscope.widgets.panels.fields import SettingsForm
+from markerscope.widgets.panels.glance_bar import link
 from markerscope.widgets.panels.stage_data import MEANING, EarlierResult, StageData, StageProgress, duration, left
 from markerscope.widgets.theme import colours
 
-_WORDS = {"stale": "out of date"}
+_WORDS = {"not run": "to do", "cached": "done", "check": "to check", "stale": "out of date"}
 """What a state is called where that is another word."""
 _LOOK = {
     "not run": ("not_run", "faint"),
     "cached": ("cached", "good"),
-    "stale": ("stale", "warning"),
+    "check": ("warning", "warning"),
+    "stale": ("stale", "faint"),
     "running": ("running", "accent"),
     "failed": ("failed", "error"),
 }
@@ -48,6 +50,7 @@ class StageCard(QFrame):
     earlier_chosen(name, key) : go back to this result
     compare_toggled(name, key, on) : show it beside the one in force
     opened(name, open) : the card was opened or closed
+    check_chosen(name, row) : show what one of the things to check is about
     """
 
     run = Signal(str)
@@ -57,6 +60,7 @@ class StageCard(QFrame):
     earlier_chosen = Signal(str, str)
     compare_toggled = Signal(str, str, bool)
     opened = Signal(str, bool)
+    check_chosen = Signal(str, int)
 
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -71,6 +75,15 @@ class StageCard(QFrame):
         self._headline = QLabel()
         self._headline.setWordWrap(True)
         self._headline.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._checks, self._note = QLabel(), QLabel()
+        self._checks.setWordWrap(True)
+        self._checks.setTextFormat(Qt.TextFormat.RichText)
+        by = Qt.TextInteractionFlag
+        self._checks.setTextInteractionFlags(by.LinksAccessibleByMouse | by.LinksAccessibleByKeyboard)
+        self._checks.setAccessibleName("To check")
+        self._checks.linkActivated.connect(lambda row: self.check_chosen.emit(self.name, int(row)))
+        self._note.setWordWrap(True)
+        self._note.setForegroundRole(QPalette.ColorRole.PlaceholderText)
         self.toggle = QToolButton()
         self.toggle.setAutoRaise(True)
         self.toggle.setCheckable(True)
@@ -128,6 +141,8 @@ class StageCard(QFrame):
         outer.setSpacing(4)
         outer.addLayout(head)
         outer.addWidget(self._headline)
+        outer.addWidget(self._checks)
+        outer.addWidget(self._note)
         outer.addWidget(self._running)
         outer.addWidget(self._details)
         self._running.hide()
@@ -148,8 +163,11 @@ class StageCard(QFrame):
         self._seconds.setToolTip("How long it took to compute")
         self._headline.setText(data.headline)
         self._headline.setVisible(bool(data.headline))
+        self._checks.setVisible(bool(data.checks))
+        self._note.setText(data.note)
+        self._note.setVisible(bool(data.note))
         self._running.setVisible(data.state == "running")
-        there = "once more: its result is there already" if data.state == "cached" else "now"
+        there = "once more: its result is there already" if data.state in ("cached", "check") else "now"
         alone = f"Compute this stage {there}. What it is computed from is computed only where it is missing."
         down = "Compute what is missing of the stages from the first down to this one. What is there stays as it is."
         for button, what in ((self.run_button, alone), (self.run_to_button, down)):
@@ -210,6 +228,7 @@ class StageCard(QFrame):
         glyph, ink = _LOOK[self._data.state]
         side = self.fontMetrics().height()
         self._icon.setPixmap(icon(glyph, ink).pixmap(QSize(side, side), self.devicePixelRatioF()))
+        self._checks.setText("<br>".join(link(row, text) for row, text in enumerate(self._data.checks)))
         self._state.setStyleSheet(f"color: rgb{getattr(look, ink)}")
         self._headline.setStyleSheet(f"color: rgb{look.error if self._data.state == 'failed' else look.text}")
 

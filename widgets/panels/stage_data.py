@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-State = Literal["not run", "cached", "stale", "running", "failed"]
+State = Literal["not run", "cached", "check", "stale", "running", "failed"]
 Kind = Literal["float", "int", "bool", "choice", "text", "range"]
 
 
@@ -78,6 +78,8 @@ class StageData:
     earlier : its results in the store, newest first
     help : what the stage does
     why_not : why it cannot run now, a clause; empty if it can
+    checks : what is to check of its result, one sentence each
+    note : what its result stands on that was decided by hand; empty where nothing is to be said
     """
 
     name: str
@@ -89,6 +91,8 @@ class StageData:
     earlier: tuple[EarlierResult, ...] = ()
     help: str = ""
     why_not: str = ""
+    checks: tuple[str, ...] = ()
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -110,6 +114,7 @@ class StageProgress:
 MEANING = {
     "not run": "This stage has no result yet.",
     "cached": "The result fits the settings and all that it was computed from.",
+    "check": "The result is there, and something in it deserves a look: the reasons stand below.",
     "stale": "A setting or an earlier stage has changed since: the results here are of before.",
     "running": "It is being computed now.",
     "failed": "It ended without a result.",

@@ -21,6 +21,7 @@ class StagePanel(QScrollArea):
     earlier_chosen = Signal(str, str)
     compare_toggled = Signal(str, str, bool)
     opened = Signal(str, bool)
+    check_chosen = Signal(str, int)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -99,6 +100,8 @@ class StagePanel(QScrollArea):
 
     def _new(self, name: str) -> StageCard:
         card = StageCard(name)
-        for signal in ("run", "run_to", "stop", "setting_changed", "earlier_chosen", "compare_toggled", "opened"):
+        for signal in (
+            "run", "run_to", "stop", "setting_changed", "earlier_chosen", "compare_toggled", "opened", "check_chosen",
+        ):  # fmt: skip
             getattr(card, signal).connect(getattr(self, signal))
         return card

@@ -22,6 +22,10 @@ class CandidateRecord:
     same_as_first : whether it is the first candidate's answer found once more
     in_use : whether the fit goes on from it
     number : by which other views call it, 0 if it has none yet
+    differs : those of its bones that not every row has, the rarest first
+    chain : number of the chain of bones, 0 where the method has none
+    repeats : number of the chain that it nearly repeats, 0 for none
+    energy : of laying it over the markers, E_S of the published method; NaN where it was not
     """
 
     part: str
@@ -36,6 +40,10 @@ class CandidateRecord:
     in_use: bool = False
     bones: tuple[str, ...] = ()
     number: int = 0
+    differs: tuple[str, ...] = ()
+    chain: int = 0
+    repeats: int = 0
+    energy: float = float("nan")
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from PySide6.QtCore import Signal
@@ -39,9 +40,16 @@ def candidate_columns(
         return factor * np.array([getattr(row, name) for row in rows], float)
 
     states = [f"{row.fate}, same as 1" if row.same_as_first else row.fate for row in rows]
+    states = [f"{state}: repeats chain {row.repeats}" if row.repeats else state for state, row in zip(states, rows)]
     states = [f"{state}, in use" if row.in_use else state for state, row in zip(states, rows)]
-    return [
+    columns = [
         _numbers(rows, colours),
+        Column(
+            "Differs by",
+            [", ".join(row.differs) for row in rows],
+            tooltip="The bones that not every row has, those of the fewest rows first",
+            tips=[", ".join(row.differs) for row in rows],
+        ),
         Column(
             "Bones",
             [row.part for row in rows],
@@ -50,12 +58,19 @@ def candidate_columns(
         ),
         Column(score, figures("score"), unit, figure, meaning or "What the candidates are ranked by, the least first"),
         Column("Margin", figures("margin"), "× best", ".2f", MARGIN),
+        Column("E_S", figures("energy"), "", figure, "Energy of laying it over the markers (equations 1 and 2)"),
         Column("Markers", figures("covered", 100), "%", ".0f", "Share of the markers that it explains", bar=(0, 100)),
         Column("Camera heading", figures("heading_deg"), "°", degrees, HEADING),
         Column("Start yaw", figures("yaw_deg"), "°", degrees, "Turn about the vertical that it was started from"),
         Column("Distance", figures("distance"), "mm", ".0f", "From the markers to the body as first laid over them"),
         Column("State", states, tooltip="How far the search took it"),
     ]
+    if any(row.chain for row in rows):
+        numbers = [row.chain or float("nan") for row in rows]
+        columns.insert(1, Column("Chain", np.array(numbers, float), "", ".0f", "Number of the chain of bones"))
+    else:
+        columns = [column for column in columns if column.title != "E_S"]
+    return [replace(column, none="") for column in columns]
 
 
 def _numbers(rows: Sequence[CandidateRecord], colours: np.ndarray | None) -> Column:
@@ -74,12 +89,14 @@ class CandidateTable(QWidget):
     -------
     row_selected(row), row_activated(row), pin_requested(row) : as of :class:`ArrayTable`
     step_chosen(name) : show what the search had after this step
+    rows_kept() : other rows are shown, after a step was chosen or words to filter by were typed
     """
 
     row_selected = Signal(int)
     row_activated = Signal(int)
     pin_requested = Signal(int)
     step_chosen = Signal(str)
+    rows_kept = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -98,6 +115,7 @@ class CandidateTable(QWidget):
         layout.addWidget(self.table, 1)
         self.table.row_selected.connect(self.row_selected)
         self.table.row_selected.connect(lambda row: self._allow())
+        self.table.filter.textChanged.connect(lambda text: self.rows_kept.emit())
         self.table.row_activated.connect(self.row_activated)
         self.table.pin_requested.connect(self.pin_requested)
         self._known: tuple[SearchStep, ...] = ()
@@ -156,6 +174,7 @@ class CandidateTable(QWidget):
     def _choose(self, button: QAbstractButton) -> None:
         self._keep(button.property("step"))
         self.step_chosen.emit(button.property("step"))
+        self.rows_kept.emit()
 
     def set_selected(self, row: int) -> None:
         """Select a row, -1 for none; nothing is emitted."""

@@ -24,6 +24,7 @@ class Column:
     bar : values of an empty and of a full bar behind the number, None for no bar
     colours : (N, 3) uint8 of a swatch before the text
     tips : one a row, for the tooltip of its cell
+    none : what stands where there is no value
     """
 
     title: str
@@ -35,6 +36,7 @@ class Column:
     bar: tuple[float, float] | None = None
     colours: np.ndarray | None = None
     tips: Sequence[str] = ()
+    none: str = "–"
 
     @property
     def heading(self) -> str:
@@ -45,7 +47,7 @@ class Column:
         """A value as it is shown."""
         value = self.values[row]
         if absent(value):
-            return "–"
+            return self.none
         if callable(self.format):
             return self.format(value)
         if isinstance(value, bool | np.bool_):

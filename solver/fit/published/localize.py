@@ -64,7 +64,12 @@ def localize_paper(
             bones = np.array(sorted(chain))
             fit = fit_chain(sequence, bones, chain_vertices(body, vertices, bones), settings, share)
             candidates.append(fit)
-            scores = {"yaw_deg": fit.yaw_deg, "one_way": fit.one_way, "chamfer": fit.chamfer}
+            scores = {
+                "yaw_deg": fit.yaw_deg,
+                "one_way": fit.one_way,
+                "chamfer": fit.chamfer,
+                "energy": fit.descent.energy,
+            }
             tell(progress, Found("chain", i, {"bones": bones, "of": len(kept), **scores}))
     pruned = np.array([sorted(chain) for chain in kept])
     if whole:

@@ -96,7 +96,7 @@ def test_an_input_that_has_gone_leaves_its_results_to_be_looked_at(session: Sess
     assert "there is no such file" in board.card("fit").why_not
     copy.write_bytes(b"other")
     board.refresh()
-    assert board.problem is None
+    assert board.problem_of(board.names) is None
     assert "markers" in stale(board)
 
 
@@ -194,9 +194,11 @@ def test_decisions_are_marked_in_the_forms(board: StageBoard) -> None:
     assert not fields["rate_ratio"].decided
 
 
-def test_without_video_and_poses_nothing_can_run(document: Document, board: StageBoard) -> None:
+def test_each_stage_asks_only_for_what_it_needs(document: Document, board: StageBoard) -> None:
     document.apply(edits.set_input(document.session, "video_file", None))
     assert "neither a video nor a pose prior" in board.card("fit").why_not
+    assert board.runnable == ("markers", "clean", "segment")
+    assert board.card("segment").why_not == ""
 
 
 def test_a_board_follows_the_document(document: Document, board: StageBoard) -> None:

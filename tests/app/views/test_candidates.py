@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from markerscope.app.views import bodies
-from markerscope.app.views.candidates import FATES, CandidateTable, bone_names, candidate_table, coverage, covered_by
+from markerscope.app.views.candidates import (
+    FATES,
+    CandidateTable,
+    bone_names,
+    candidate_table,
+    chains_of,
+    coverage,
+    covered_by,
+)
 from markerscope.app.views.convergence import of_orientation, of_paper
 from markerscope.app.views.hypotheses import hypotheses_picture
 from markerscope.solver.body.model import Body
@@ -247,3 +255,21 @@ def test_endings_are_said(paper_results: Mapping[str, Any], iterations: int) -> 
     descent = replace(fit.descent, converged=bool(iterations))
     curve = of_paper(replace(found, candidates=(replace(fit, descent=descent),)))[0]
     assert curve.ended == ("converged" if iterations else f"stopped at the cap of {descent.iterations} iterations")
+
+
+def test_chains_are_numbered_told_apart_and_say_which_they_repeat(paper_results: Mapping[str, Any]) -> None:
+    found: PaperLocalization = paper_results["localize"]
+    rows = [row for row in candidate_table(found, paper_results["orient"]).rows if row.candidate < 0 or row.chain]
+    chains = chains_of(found)
+    assert set(chains) == set(subtrees(found.groups)) and len(chains) == found.chains
+    every = set.intersection(*(set(bone_names(sorted(chain))) for chain in chains))
+    for row in rows:
+        own = chains[row.chain - 1]
+        assert row.bones == bone_names(sorted(own)) and not set(row.differs) & every
+        if row.fate == "scored":
+            fit = found.candidates[row.pool]
+            assert (row.energy, row.score) == (fit.descent.energy, 1e6 * fit.chamfer)
+        if row.fate == "too alike":
+            shared = [len(own & kept) for kept in chains[: len(found.pruned)]]
+            assert shared[row.repeats - 1] == max(shared) > 0.5 * len(own)
+        assert not row.can_pin

@@ -89,7 +89,7 @@ def test_candidates_fill_the_table_while_they_are_searched(window: MainWindow, s
     counts: list[int] = []
 
     def count() -> None:
-        scores = window.candidates.table.model.columns[2].values if window.candidates.table.model.columns else []
+        scores = window.candidates.table.model.columns[3].values if window.candidates.table.model.columns else []
         counts.append(int(np.isfinite(np.asarray(scores, float)).sum()))
 
     bench.runner.found.connect(lambda found: count() if found.kind == "candidate" else None)

@@ -30,7 +30,7 @@ def test_chains_are_stepped_through_and_descents_scrubbed(
         spin()
         counts[name] = len(window.candidates.table.shown_rows())
     assert counts["Pool"] >= counts["Pruned"] >= counts["Scored"] > 0 and counts["Refined"] == 2
-    assert [c.title for c in window.candidates.table.model.columns][2] == "Chamfer"
+    assert [c.title for c in window.candidates.table.model.columns][4] == "Chamfer"
     buttons["Scored"].click()
     spin()
     plain = picture(window.scene)
