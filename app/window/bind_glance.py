@@ -86,13 +86,13 @@ class GlanceBinder:
             self.widget.plan.setText(self._doing())
 
     def _tiles(self) -> tuple[Tile, ...]:
-        given = [self.shown.get(name) for name in _STANDS_ON]
-        if any(value is None for value in given):
+        sync, ranked, motion, surface, check = (self.shown.get(name) for name in _STANDS_ON)
+        if any(value is None for value in (sync, ranked, motion, surface, check)):
             return ()
         held, doubtful = pinned(self.bench), {concern.stage for concern in self.concerned.all}
         return tuple(
             Tile(row.label, row.value, row.note, bool(doubtful & set(_OF.get(row.label, ()))))
-            for row in headlines(*given, held)
+            for row in headlines(sync, ranked, motion, surface, check, held)
         )
 
     def _chosen(self, row: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QApplication, QLabel, QPlainTextEdit, QVBoxLayout, QWidget
 
 from markerscope.widgets.panels.glance_bar import GlanceBar, GlanceData, Tile
 
@@ -34,3 +34,20 @@ def test_it_says_what_solve_does_and_what_is_to_check(qapp: QApplication) -> Non
     bar.set_data(GlanceData("Computes Fit.", tiles=tiles, old=True))
     assert any("out of date" in label.text() for label in bar.findChildren(QLabel)) and not bar.checks.isVisible()
     bar.close()
+
+
+def test_no_sentence_is_cut_off_in_a_narrow_column(qapp: QApplication) -> None:
+    column = QWidget()
+    layout = QVBoxLayout(column)
+    bar = GlanceBar()
+    layout.addWidget(bar)
+    layout.addWidget(QPlainTextEdit(), 1)
+    column.resize(300, 700)
+    column.show()
+    long = "The markers are 38 mm from where the body puts them, which is no fit to rely on. " * 2
+    bar.set_data(GlanceData("Computes 7 stages, Synchronisation to Doubts: about 23 s.", checks=(long, long, long)))
+    for _ in range(4):
+        qapp.processEvents()
+    for label in (bar.plan, bar.checks):
+        assert label.height() >= label.heightForWidth(label.width()) > label.fontMetrics().height()
+    column.close()

@@ -6,6 +6,7 @@ import html
 from dataclasses import dataclass
 
 from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from markerscope.widgets.allow import allow
@@ -90,7 +91,7 @@ class GlanceBar(QFrame):
         outer.setSpacing(4)
         outer.addLayout(head)
         outer.addWidget(self._tiles)
-        outer.addWidget(self.checks, 1)  # what height is left is the sentences'
+        outer.addWidget(self.checks)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self.set_data(GlanceData(why_not="no session is open"))
 
@@ -156,8 +157,27 @@ def link(row: int, text: str) -> str:
     return f"<a href='{row}' style='color: rgb{colours().warning}'>{html.escape(text)}</a>"
 
 
+class _Wrapped(QLabel):
+    """Words that wrap, with all the height that they need at the width they have."""
+
+    def setText(self, text: str) -> None:
+        """Show it."""
+        super().setText(text)
+        self._grow()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Need another height at another width."""
+        super().resizeEvent(event)
+        self._grow()
+
+    def _grow(self) -> None:
+        needed = self.heightForWidth(self.width())
+        if needed != self.minimumHeight():
+            self.setMinimumHeight(max(needed, 0))
+
+
 def _wrapping(name: str) -> QLabel:
-    label = QLabel()
+    label = _Wrapped()
     label.setWordWrap(True)
     label.setTextFormat(Qt.TextFormat.PlainText)
     label.setAccessibleName(name)
