@@ -19,9 +19,13 @@ def run_until(bench: Workbench, stage: str | None) -> None:
         until = [name for name in above if name == stage or name in runnable]
     if not bench.runner.run(until):
         what = "All results are" if stage is None else f"Everything up to {title(stage)} is"
-        bench.say(Said("note", f"{what} there for these settings already", remedy=_left_out(bench, until)))
+        bench.say(Said("note", _and(f"{what} there for these settings already", _left_out(bench, until))))
     elif left := _left_out(bench, until):
-        bench.say(Said("note", "Only what the markers alone allow is computed", remedy=left))
+        bench.say(Said("note", _and("Only what the files that are there allow is computed", left)))
+
+
+def _and(said: str, more: str) -> str:
+    return f"{said}; {more}" if more else said
 
 
 def _left_out(bench: Workbench, until: list[str] | None) -> str:
@@ -31,7 +35,7 @@ def _left_out(bench: Workbench, until: list[str] | None) -> str:
     problem = board.problem_of(others)
     if problem is None:
         return ""
-    return f"{title(others[0])} and {len(others) - 1} more stages wait, since {problem.what}"
+    return f"{title(others[0])} and {len(others) - 1} more stages wait, since {str(problem).rstrip('.')}"
 
 
 def run_stage(bench: Workbench, stage: str) -> None:

@@ -213,8 +213,10 @@ class Workbench:
 
     def _search(self) -> tuple[object, ...]:
         """Which method, and which of its results the rows of candidates and hypotheses are of."""
+        if not self.document.is_open:
+            return ()
         latest = [self.board.latest(stage) for stage in ("localize", "solve", "orient")]
-        method = self.document.session.run.method if self.document.is_open else None
+        method = self.document.session.run.method
         return (method, *(None if known is None else known[0] for known in latest))
 
     def _leave_others(self) -> None:

@@ -24,7 +24,7 @@ _OF = {
     "Sync offset": ("sync",),
 }
 """The stages whose doubts a figure shows."""
-_STANDS_ON = ("sync", "orient", "fit", "surface", "check")
+STANDS_ON = ("sync", "orient", "fit", "surface", "check")
 
 
 class GlanceBinder:
@@ -54,7 +54,7 @@ class GlanceBinder:
         board = bench.board
         failed = [name for name in board.names if board.state(name) == "failed"]
         tiles = self._tiles()
-        old = bool(tiles) and any(self.shown.stale(name) for name in _STANDS_ON)
+        old = bool(tiles) and any(self.shown.stale(name) for name in STANDS_ON)
         self.widget.set_data(
             GlanceData(
                 self._doing() if running else self._plan(why_not),
@@ -86,7 +86,7 @@ class GlanceBinder:
             self.widget.plan.setText(self._doing())
 
     def _tiles(self) -> tuple[Tile, ...]:
-        sync, ranked, motion, surface, check = (self.shown.get(name) for name in _STANDS_ON)
+        sync, ranked, motion, surface, check = (self.shown.get(name) for name in STANDS_ON)
         if any(value is None for value in (sync, ranked, motion, surface, check)):
             return ()
         held, doubtful = pinned(self.bench), {concern.stage for concern in self.concerned.all}

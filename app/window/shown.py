@@ -186,9 +186,9 @@ class Shown:
         raw, cleaned = self.get("markers"), self.get("clean")
         if cleaned is None or raw is None:
             return raw if cleaned is None else cleaned.markers
-        frames, columns = raw.positions.shape[:2]
-        now = cleaned.markers.positions.shape  # trajectories that were cut in two come behind those of the file
-        return cleaned.markers if now[0] == frames and now[1] >= columns else raw
+        # Trajectories that were cut in two come behind those of the file, so there may be more of them.
+        alike = cleaned.markers.positions.shape == raw.positions.shape
+        return cleaned.markers if alike or self.made_from("clean", "markers") else raw
 
     @property
     def fit(self) -> FittedMotion | None:
