@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from markerscope.solver.io.c3d_format import BLOCK
+from markerscope.solver.io.c3d_parameters import BLOCK, DEC, from_floats
 
 Value = tuple[str, ...] | np.ndarray
 """Text, or numbers: integers are written as 16 bits, others as floats."""
@@ -85,6 +85,22 @@ def _record(name: str, identity: int, content: bytes) -> bytes:
     if link > 32767:
         raise ValueError(f"the parameter {name} is too large")
     return struct.pack("<bb", len(name), identity) + name.encode("ascii") + struct.pack("<H", link) + content
+
+
+def parameter_content(value: Value, order: str, processor: int) -> bytes:
+    """What stands behind a parameter's link, with an empty description, in the byte order of another file.
+
+    Parameters
+    ----------
+    value : text, or numbers of up to two dimensions (the last one runs fastest)
+    order, processor : as in the file's ``Section``
+    """
+    if isinstance(value, tuple):
+        return _value(value) + b"\0"
+    kind = 2 if np.issubdtype(value.dtype, np.integer) else 4
+    shape = () if value.size == 1 else value.shape[::-1]
+    raw = value.astype(order + "u2").tobytes() if kind == 2 else from_floats(value, order, processor == DEC)
+    return struct.pack(f"<bB{len(shape)}B", kind, len(shape), *shape) + raw + b"\0"
 
 
 def _value(value: Value) -> bytes:

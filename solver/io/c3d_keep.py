@@ -16,7 +16,15 @@ from markerscope.solver.io.c3d import read_c3d
 from markerscope.solver.io.c3d_encode import MEASURED_WORD
 from markerscope.solver.io.c3d_format import C3DContent, decode_c3d
 from markerscope.solver.io.c3d_layout import Layout, point_words, trial_range
-from markerscope.solver.io.c3d_parameters import BLOCK, DEC, from_floats, section_bytes, with_numbers, with_texts
+from markerscope.solver.io.c3d_parameters import (
+    BLOCK,
+    DEC,
+    Section,
+    from_floats,
+    section_bytes,
+    with_numbers,
+    with_texts,
+)
 from markerscope.solver.io.labels import unique
 from markerscope.solver.io.markers_in import is_c3d, markers_of
 from markerscope.solver.io.text import read_bytes
@@ -159,13 +167,28 @@ def _head(
         _cut_frames(head, contents, content, start, frames)
     if labels is not None:
         _rename(contents, content, points, labels)
-    if not contents:
-        return bytes(head)
+    return bytes(head) if not contents else _moved(bytes(head), section, contents, layout)
+
+
+def with_section(data: bytes, content: C3DContent, section: Section) -> bytes:
+    """A whole file's bytes with another parameter section; points and analog values move behind it.
+
+    Raises
+    ------
+    ValueError : it cannot be had, in words that follow "of this file could not be kept"
+    """
+    layout = content.layout
+    return _moved(data[: layout.begin], section, {}, layout) + data[layout.begin :]
+
+
+def _moved(start: bytes, section: Section, contents: dict[int, bytes], layout: Layout) -> bytes:
+    """Header and parameters up to the data, the parameters written anew; where they take more room, the data move."""
+    head, contents = bytearray(start), dict(contents)
     first = (section.block - 1) * BLOCK
     if first >= layout.begin:
         raise ValueError("its parameters, which stand behind the points")
     room = (layout.begin - first) // BLOCK
-    new = section_bytes(section, data[first : first + 2], contents, room)
+    new = section_bytes(section, start[first : first + 2], contents, room)
     moved = len(new) // BLOCK - room
     if moved:
         for name in (("POINT", "DATA_START"), ("ROTATION", "DATA_START")):
@@ -173,7 +196,7 @@ def _head(
             if record is not None and value:
                 at = section.records.index(record)
                 contents[at] = with_numbers(record.content, np.array([value + moved]), section.order, False)
-        new = section_bytes(section, data[first : first + 2], contents, room)
+        new = section_bytes(section, start[first : first + 2], contents, room)
         struct.pack_into(section.order + "H", head, 16, layout.begin // BLOCK + 1 + moved)
     return bytes(head[:first]) + new
 
