@@ -9,6 +9,7 @@ from pathlib import Path
 
 from markerscope.app.cli.clean import clean_request
 from markerscope.app.cli.dataset import dataset_request
+from markerscope.app.cli.events import cycles_request, events_request
 from markerscope.app.cli.output import Terminal
 from markerscope.app.cli.synth import synth_settings
 from markerscope.app.cli.train import train_request
@@ -25,7 +26,9 @@ from markerscope.solver.core.request import (
     SynthRequest,
     check_inputs,
 )
+from markerscope.solver.cycles.request import CyclesRequest
 from markerscope.solver.datasets.request import DatasetRequest
+from markerscope.solver.events.request import EventsRequest
 from markerscope.solver.neural.request import TrainRequest
 
 
@@ -77,6 +80,18 @@ def _train(request: TrainRequest, progress: Progress) -> Outcome:
     return train_network(request, progress)
 
 
+def _events(request: EventsRequest, progress: Progress) -> Outcome:
+    from markerscope.solver.commands.events import find_events
+
+    return find_events(request, progress)
+
+
+def _cycles(request: CyclesRequest, progress: Progress) -> Outcome:
+    from markerscope.solver.commands.cycles import make_cycles
+
+    return make_cycles(request, progress)
+
+
 def _no_window() -> str:
     from markerscope.app.window.start import display_problem
 
@@ -101,6 +116,8 @@ class Services:
     dataset: Callable[[DatasetRequest, Progress], Outcome] = _dataset
     clean: Callable[[CleanRequest, Progress], Outcome] = _clean
     train: Callable[[TrainRequest, Progress], Outcome] = _train
+    events: Callable[[EventsRequest, Progress], Outcome] = _events
+    cycles: Callable[[CyclesRequest, Progress], Outcome] = _cycles
     no_window: Callable[[], str] = _no_window
     window: Callable[[Path | None, bool], int] = _window
 
@@ -185,6 +202,20 @@ def run_train(options: argparse.Namespace, services: Services) -> int:
     """``markerscope train``."""
     with Terminal(options) as terminal:
         terminal.show(services.train(train_request(options), terminal.progress))
+    return 0
+
+
+def run_events(options: argparse.Namespace, services: Services) -> int:
+    """``markerscope events``."""
+    with Terminal(options) as terminal:
+        terminal.show(services.events(events_request(options), terminal.progress))
+    return 0
+
+
+def run_cycles(options: argparse.Namespace, services: Services) -> int:
+    """``markerscope cycles``."""
+    with Terminal(options) as terminal:
+        terminal.show(services.cycles(cycles_request(options), terminal.progress))
     return 0
 
 

@@ -19,15 +19,18 @@ from markerscope.app.cli.commands import (
     Services,
     run_bench,
     run_clean,
+    run_cycles,
     run_dataset,
     run_demo,
     run_evaluate,
+    run_events,
     run_solve,
     run_synth,
     run_train,
 )
 from markerscope.app.cli.dataset import dataset_options
 from markerscope.app.cli.endings import CANCELLED, REFUSED, ended
+from markerscope.app.cli.events import cycles_options, events_options
 from markerscope.app.cli.output import standard_output
 from markerscope.app.cli.synth import synth_options
 from markerscope.app.cli.train import train_options
@@ -40,6 +43,8 @@ COMMANDS = {
     "demo": "solve the embedded session and say how close it came to the known truth",
     "solve": "from markers and a video to a body, named markers and joint angles",
     "evaluate": "how far a result is from another one or from a reference",
+    "events": "foot strikes and offs of a trial, or repetitions of a movement",
+    "cycles": "curves cut into cycles: mean and spread, steps in space and time, scores, a figure",
     "clean": "cut outliers and fill gaps of a marker file, every change listed",
     "bench": "how good the methods are on synthetic sessions whose truth is known",
     "synth": "make a session whose truth is known, as files",
@@ -117,6 +122,16 @@ def _parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--body", type=Path, metavar="FILE", help="SMPL-layout model of the reference")
     _common(evaluate)
     evaluate.set_defaults(run=run_evaluate)
+
+    events = commands.add_parser("events", help=COMMANDS["events"], description=_sentence("events"))
+    events_options(events)
+    _common(events)
+    events.set_defaults(run=run_events)
+
+    cycles = commands.add_parser("cycles", help=COMMANDS["cycles"], description=_sentence("cycles"))
+    cycles_options(cycles)
+    _common(cycles)
+    cycles.set_defaults(run=run_cycles)
 
     bench = commands.add_parser("bench", help=COMMANDS["bench"], description=_sentence("bench"))
     _bench_options(bench)

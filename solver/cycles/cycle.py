@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -62,7 +63,7 @@ def gait_cycles(events: Iterable[Event]) -> tuple[Cycle, ...]:
     for side in ("left", "right"):
         strikes, offs = times_of(events, side, STRIKE), times_of(events, side, OFF)
         others = times_of(events, _OTHER[side], STRIKE), times_of(events, _OTHER[side], OFF)
-        for number, (start, end) in enumerate(zip(strikes, strikes[1:]), 1):
+        for number, (start, end) in enumerate(pairwise(strikes), 1):
             within = offs[(offs > start) & (offs < end)]
             other_strike, other_off = (_only(times, start, end) for times in others)
             why = ""

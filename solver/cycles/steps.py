@@ -9,7 +9,6 @@ import numpy as np
 from markerscope.solver.cycles.curve import Scalar
 from markerscope.solver.cycles.cycle import Cycle
 from markerscope.solver.events.feet import Feet
-from markerscope.solver.events.steps import heading
 
 DEFINITIONS = {
     "stride time": ("s", "from a strike of the foot to its next strike"),
@@ -17,10 +16,16 @@ DEFINITIONS = {
     "cadence": ("steps/min", "two steps in a stride time: 120 / stride time"),
     "stance": ("%", "strike to off of the same foot, in percent of the stride time"),
     "swing": ("%", "off to the next strike, in percent of the stride time"),
-    "double support": ("%", "both feet on the ground: strike to the other foot's off, and the other foot's strike to off"),
+    "double support": (
+        "%",
+        "both feet on the ground: strike to the other foot's off, and the other foot's strike to off",
+    ),
     "single support": ("%", "the other foot's off to its strike, in percent of the stride time"),
-    "stride length": ("m", "way of the heel between two strikes of the foot, along the direction of progression"),
-    "step length": ("m", "this heel ahead of the other one at this foot's next strike, along the same direction"),
+    "stride length": ("m", "distance of the heel between two strikes of the foot, on the floor"),
+    "step length": (
+        "m",
+        "this heel ahead of the other one at this foot's next strike, along the direction of progression there",
+    ),
     "step width": ("m", "between the two heels at that strike, across the direction of progression"),
     "walking speed": ("m/s", "stride length over stride time"),
 }
@@ -29,14 +34,14 @@ DEFINITIONS = {
 _TRAVELS_M_S = 0.15
 
 
-def step_table(trial: str, feet: Feet, cycles: Sequence[Cycle]) -> tuple[Scalar, ...]:
+def step_table(trial: str, feet: Feet, cycles: Sequence[Cycle], ahead: np.ndarray) -> tuple[Scalar, ...]:
     """The figures of every gait cycle used.
 
     Parameters
     ----------
     feet : where heels and pelvis are
+    ahead : (T, 2) the direction of progression
     """
-    ahead = heading(feet.pelvis, list(feet.sides.values()), feet.rate)
     rows: list[Scalar] = []
     for cycle in cycles:
         if not cycle.used or cycle.side not in ("left", "right"):
@@ -81,11 +86,11 @@ def _lengths(cycle: Cycle, feet: Feet, ahead: np.ndarray) -> dict[str, float]:
     way = at(feet.pelvis, cycle.end) - at(feet.pelvis, cycle.start)
     travel = float(np.linalg.norm(way))
     travels = travel / stride_time > _TRAVELS_M_S
-    # Over a whole stride the pelvis ends where it began beside the path: that is the direction, without its sway.
-    direction = way / travel if travels else at(ahead, cycle.end)
+    # A step is measured where it ends, so that in a curve both feet are measured alike.
+    direction = at(ahead, cycle.end)
     direction = direction / max(float(np.linalg.norm(direction)), 1e-12)
     across = np.array([-direction[1], direction[0]])
-    stride = float((at(own.heel, cycle.end) - at(own.heel, cycle.start)) @ direction) if travels else float("nan")
+    stride = float(np.linalg.norm(at(own.heel, cycle.end) - at(own.heel, cycle.start))) if travels else float("nan")
     found = {"stride length": stride, "walking speed": stride / stride_time}
     if other is None or not np.isfinite(cycle.other_strike):
         return none | found

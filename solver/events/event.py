@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -60,7 +61,7 @@ def strange(events: Iterable[Event]) -> tuple[str, ...]:
     found = []
     for side in SIDES:
         steps = [event for event in in_order(events) if event.side == side and event.kind in (STRIKE, OFF)]
-        for first, second in zip(steps, steps[1:]):
+        for first, second in pairwise(steps):
             if first.kind == second.kind:
                 other = "off" if first.kind == STRIKE else "strike"
                 found.append(

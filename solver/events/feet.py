@@ -13,7 +13,9 @@ from markerscope.solver.core.skeleton import INDEX
 
 _SIDE = {"left": r"(?:l|left)[ _.-]*", "right": r"(?:r|right)[ _.-]*"}
 _HEEL = r"(?:heel|hee|calc|calcaneus|hel|fcc|cal|heel[ _.-]?(?:back|rear))"
-_TOE = r"(?:toe|to|toetip|mtp2|mt2|fm2|smh|dm2|meta2|2meta|mth2|hallux|hlx|toe[ _.-]?tip|big[ _.-]?toe|mt1|fmh|fm1|mt23)"
+_TOE = (
+    r"(?:toe|to|toetip|mtp2|mt2|fm2|smh|dm2|meta2|2meta|mth2|hallux|hlx|toe[ _.-]?tip|big[ _.-]?toe|mt1|fmh|fm1|mt23)"
+)
 _SIDE_OF_FOOT = r"(?:mt5|fm5|5meta|vmh|d5m|mth5|dm5|lfoot|5th[ _.-]?met|little[ _.-]?toe)"
 _PELVIS = r"(?:asi|asis|psi|psis|ias|ips|iasd|ipsd)[sd]?"
 _SACRUM = r"(?:sacr|sacrum|vsacral|v[ _.-]?sacral|s1|s2)"
@@ -59,9 +61,7 @@ class Feet:
     @property
     def seen(self) -> dict[str, float]:
         """Share of the frames in which each foot is there."""
-        return {
-            side: float(np.isfinite(foot.heel + foot.toe).all(axis=1).mean()) for side, foot in self.sides.items()
-        }
+        return {side: float(np.isfinite(foot.heel + foot.toe).all(axis=1).mean()) for side, foot in self.sides.items()}
 
 
 def feet_by_name(markers: Markers) -> Feet | None:

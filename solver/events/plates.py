@@ -57,7 +57,7 @@ def contacts(plate: ForcePlate, threshold: float = THRESHOLD_N) -> list[tuple[tu
     rate = (len(time) - 1) / (time[-1] - time[0])
     loaded = force > threshold
     for run in stretches(~loaded):
-        if 0 < run.start and run.stop < len(loaded) and run.stop - run.start < _JOINED_S * rate:
+        if run.start > 0 and run.stop < len(loaded) and run.stop - run.start < _JOINED_S * rate:
             loaded[run] = True
     found = []
     for run in stretches(loaded):

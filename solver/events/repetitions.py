@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from markerscope.solver.core.errors import InputError
-from markerscope.solver.events.event import Event
+from markerscope.solver.events.event import Event, Kind
 from markerscope.solver.filters.smooth import Filter, smooth
 
 
@@ -95,11 +95,11 @@ def find_repetitions(
 
 def events_of_repetitions(repetitions: tuple[Repetition, ...], angle: str) -> tuple[Event, ...]:
     """Start, turn and end of each as events of no side."""
-    return tuple(
-        Event(time, "general", kind, "angle", label=f"{angle} {kind}")
-        for one in repetitions
-        for kind, time in (("start", one.start), ("turn", one.turn), ("end", one.end))
-    )
+    found = []
+    for one in repetitions:
+        kinds: tuple[tuple[Kind, float], ...] = (("start", one.start), ("turn", one.turn), ("end", one.end))
+        found += [Event(time, "general", kind, "angle", label=f"{angle} {kind}") for kind, time in kinds]
+    return tuple(found)
 
 
 def _crossing(time: np.ndarray, share: np.ndarray, k: int, level: float) -> float:

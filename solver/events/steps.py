@@ -64,7 +64,7 @@ class Steps:
 
 DEFAULT = StepSettings()
 _DROP = 0.05
-"""Share of the swing by which a peak stands out on its lower side, where the recording or the sight of the foot ends."""
+"""Share of the swing by which a peak stands out on its lower side, where the recording or the sight of a foot ends."""
 
 
 def find_steps(feet: Feet, settings: StepSettings = DEFAULT, *, body: bool = False) -> Steps:
@@ -105,7 +105,9 @@ def find_steps(feet: Feet, settings: StepSettings = DEFAULT, *, body: bool = Fal
                 events.append(Event(time, _side(side), kind, "body" if body else "markers", spread))
         lost = 1 - float(np.isfinite(place).mean())
         if lost > 0.05:
-            notes.append(f"The {side} foot is lost in {100 * lost:.0f} % of the frames; steps there were not looked for.")
+            notes.append(
+                f"The {side} foot is lost in {100 * lost:.0f} % of the frames; steps there were not looked for."
+            )
     kept, left = _possible(in_order(events), settings)
     doubtful = [event for event in kept if event.spread > settings.doubtful]
     if doubtful:
@@ -117,7 +119,8 @@ def find_steps(feet: Feet, settings: StepSettings = DEFAULT, *, body: bool = Fal
 
 def _possible(events: tuple[Event, ...], settings: StepSettings) -> tuple[tuple[Event, ...], list[str]]:
     """The events less those that would make a stance or a swing too short for anybody; what was left out."""
-    kept, notes = list(events), []
+    kept = list(events)
+    notes: list[str] = []
     while True:
         pairs = [
             (one, other)
@@ -168,9 +171,7 @@ def _of_foot(
         for t in _peaks(heel, rate, settings)
         if np.nanmax(speed[max(0, t - back) : t + 1], initial=0) > settings.least_speed
     ]
-    offs = [
-        t for t in _peaks(-toe, rate, settings) if np.nanmax(speed[t : t + fore], initial=0) > settings.least_speed
-    ]
+    offs = [t for t in _peaks(-toe, rate, settings) if np.nanmax(speed[t : t + fore], initial=0) > settings.least_speed]
     return strikes, offs
 
 
@@ -215,7 +216,7 @@ def _off_times(foot: Foot, frame: int, rate: float, settings: StepSettings, runn
 
 
 def _least(signal: np.ndarray, frame: float, rate: float, settings: StepSettings) -> float:
-    """s from the first frame, of the least value near a frame, to a part of a frame; NaN where it lies at an end."""
+    """S from the first frame, of the least value near a frame, to a part of a frame; NaN where it lies at an end."""
     first = max(0, round(frame - settings.near * rate))
     last = min(len(signal), round(frame + settings.near * rate) + 1)
     piece = signal[first:last]
@@ -233,7 +234,7 @@ def _runs(found: dict[str, tuple[list[int], list[int]]], rate: float) -> bool:
     """Whether a foot is on the ground for less than half of a stride: nobody walks so, everybody runs so."""
     shares = []
     for strikes, offs in found.values():
-        for a, b in zip(strikes, strikes[1:]):
+        for a, b in pairwise(strikes):
             between = [t for t in offs if a < t < b]
             if len(between) == 1 and b - a < 2.5 * rate:
                 shares.append((between[0] - a) / (b - a))
@@ -266,7 +267,7 @@ def _bridged(points: np.ndarray, longest: int | None = None) -> np.ndarray:
         return out
     curve = PchipInterpolator(frames[known], points[known], axis=0, extrapolate=False)
     for gap in stretches(~known):
-        if 0 < gap.start and gap.stop < len(points) and gap.stop - gap.start <= longest:
+        if gap.start > 0 and gap.stop < len(points) and gap.stop - gap.start <= longest:
             out[gap] = curve(frames[gap])
     return out
 

@@ -140,7 +140,7 @@ def residual_analysis(values: np.ndarray, rate: float, order: int = 4) -> Residu
         off = smooth(values, rate, Filter("butterworth", order, float(cutoff))) - values
         residuals[i] = np.sqrt(np.nanmean(off**2))
     end = cutoffs >= 0.5 * highest
-    slope, noise = np.polyfit(cutoffs[end], residuals[end], 1)
+    _, noise = np.polyfit(cutoffs[end], residuals[end], 1)
     noise = max(float(noise), 0.0)
     below = np.flatnonzero(residuals <= noise)
     cutoff = float(cutoffs[below[0]]) if len(below) else float(highest)

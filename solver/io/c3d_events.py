@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -45,11 +44,7 @@ def events_of(content: C3DContent) -> tuple[FileEvent, ...]:
     for i in range(min(used, len(times)) if used else 0):
         time = float(60 * times[i, 0] + times[i, 1])
         if np.isfinite(time):
-            rows.append(
-                FileEvent(
-                    time, contexts[i] if i < len(contexts) else "", labels[i] if i < len(labels) else ""
-                )
-            )
+            rows.append(FileEvent(time, contexts[i] if i < len(contexts) else "", labels[i] if i < len(labels) else ""))
     return tuple(rows)
 
 

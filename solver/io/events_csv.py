@@ -58,7 +58,9 @@ def read_events_csv(path: str | Path) -> tuple[EventRow, ...]:
         try:
             time, spread = float(row["time"]), float(row.get("spread") or "nan")
         except (ValueError, KeyError) as error:
-            raise InputError(f"has no time in line {number}", path, "give it in seconds, with a decimal point") from error
+            raise InputError(
+                f"has no time in line {number}", path, "give it in seconds, with a decimal point"
+            ) from error
         if len(cells) < 3 or row.get("side", "").lower() not in ("left", "right", "general"):
             raise InputError(f"names no side in line {number}", path, "say left, right or general")
         rows.append(EventRow(time, row["side"].lower(), row["event"], row.get("source") or "hand", spread))

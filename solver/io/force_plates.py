@@ -171,9 +171,7 @@ def plates_of_mot(path: str | Path) -> tuple[ForcePlate, ...]:
     """
     table = read_mot(path)
     names = [name.removesuffix("vx") for name in table.columns if name.endswith("vx")]
-    whole = [
-        name for name in names if all(f"{name}{part}{axis}" in table.columns for part in "vp" for axis in "xyz")
-    ]
+    whole = [name for name in names if all(f"{name}{part}{axis}" in table.columns for part in "vp" for axis in "xyz")]
     if not whole:
         what = "holds no ground reaction forces (columns ending in vx, vy, vz and px, py, pz)"
         raise InputError(what, path, "give the file that OpenSim's external loads are read from")
@@ -186,7 +184,5 @@ def plates_of_mot(path: str | Path) -> tuple[ForcePlate, ...]:
         loaded = force[:, 2] > _LOADED_N
         if not loaded.any():
             continue
-        found.append(
-            ForcePlate(name.strip("_"), table.time, force, np.where(loaded[:, None], place, np.nan), None)
-        )
+        found.append(ForcePlate(name.strip("_"), table.time, force, np.where(loaded[:, None], place, np.nan), None))
     return tuple(found)

@@ -180,6 +180,8 @@ class ReportData:
     hypotheses : best first
     margin : energy of the best different answer over the best, NaN or infinite if there is none
     angles : curves in the order they are drawn
+    gait : the page of gait curves as SVG, "" where there were no whole cycles
+    gait_notes : on that page, one sentence each
     zero_pose : what the angles are counted from, and their convention, in words
     residuals : one per marker
     gaps : when markers were seen
@@ -197,6 +199,8 @@ class ReportData:
     hypotheses: tuple[Hypothesis, ...] = ()
     margin: float = float("nan")
     angles: tuple[AngleCurve, ...] = ()
+    gait: str = ""
+    gait_notes: tuple[str, ...] = ()
     zero_pose: str = ""
     residuals: tuple[MarkerResidual, ...] = ()
     gaps: Gaps | None = None

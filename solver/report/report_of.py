@@ -10,16 +10,19 @@ from typing import Any
 
 import numpy as np
 
+from markerscope.solver.body.bones import load_body
 from markerscope.solver.clustering.segment import Segmentation
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.skeleton import BONES, JOINTS
+from markerscope.solver.figures.svg import svg
 from markerscope.solver.fit.pull.results import words_of
 from markerscope.solver.fit.results import FittedMotion, Orientation
 from markerscope.solver.pipeline.doubts import doubts
 from markerscope.solver.pipeline.names import ANGLES, CHECK, CLEAN, FIT, ORIENT, PRIOR, SEGMENT, SURFACE, SYNC
 from markerscope.solver.pipeline.session import Session
 from markerscope.solver.pipeline.stage import GraphRun
+from markerscope.solver.report.gait import gait_of
 from markerscope.solver.report.headlines import headlines, said_pinned
 from markerscope.solver.report.report import write_report
 from markerscope.solver.report.report_data import (
@@ -84,6 +87,8 @@ def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str,
     pinned = about["stages"]["fit"]["settings"].get("candidate")
     stands_on = f", {said_pinned(pinned)}" if pinned is not None else ""
     part = ranked.candidates[motion.chosen].part
+    body_file = session.inputs.get("body_file")
+    gait = gait_of(motion, load_body(body_file.path if body_file else None), markers.rate, marker_file.stem)
     filled = np.zeros(markers.present.shape, bool) if named.filled is None else named.filled
     return ReportData(
         title=marker_file.stem,
@@ -95,6 +100,8 @@ def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str,
         hypotheses=_hypotheses(ranked, motion),
         margin=ranked.margin,
         angles=_curves(graph[ANGLES]),
+        gait="" if gait is None else svg(gait.page),
+        gait_notes=() if gait is None else gait.notes,
         zero_pose=graph[ANGLES].zero_pose,
         residuals=marker_residuals(
             named.labels,
