@@ -1,7 +1,7 @@
 """Foot strikes and offs from where the feet are: the middle of several published estimates.
 
 Strike: the foot furthest ahead of the pelvis (Zeni et al. 2008), which comes early; the fastest fall of the foot's
-centre (O'Connor et al. 2007); the fastest fall of the heel. Off: the foot furthest behind the pelvis (Zeni); the
+centre (O'Connor et al. 2007); the lowest point of the heel. Off: the foot furthest behind the pelvis (Zeni); the
 fastest rise of the foot's centre (O'Connor); the toe's greatest upward acceleration, which comes early (after Hreljac
 and Marshall 2000). Running leaves the ground while the foot still moves back, so that the last one alone is taken.
 """
@@ -201,9 +201,9 @@ def _peaks(signal: np.ndarray, rate: float, settings: StepSettings) -> list[int]
 
 
 def _strike_times(foot: Foot, frame: int, rate: float, settings: StepSettings) -> tuple[float, float, float]:
-    centre, heel = (_derivative(part[:, 2]) for part in (foot.centre, foot.heel))
     middle = frame + settings.zeni_strike * rate
-    return (middle / rate, _least(centre, middle, rate, settings), _least(heel, middle, rate, settings))
+    fall = _derivative(foot.centre[:, 2])
+    return (middle / rate, _least(fall, middle, rate, settings), _least(foot.heel[:, 2], middle, rate, settings))
 
 
 def _off_times(foot: Foot, frame: int, rate: float, settings: StepSettings, running: bool) -> tuple[float, ...]:

@@ -20,14 +20,9 @@ POINTS = np.random.default_rng(0).normal(0, 500, (30, 4, 3))
 
 def file_with(contexts: list[str], labels: list[str], times: list[float]) -> bytes:
     pairs = np.array([[t // 60, t % 60] for t in times])
-    group = {"USED": np.array(len(times)), "CONTEXTS": contexts, "LABELS": labels, "TIMES": pairs.T.copy().T}
-    stored = group | {"TIMES": np.asarray(pairs, float).reshape(2, -1, order="A") if False else _columns(pairs)}
-    return c3d_bytes(POINTS, groups={"EVENT": stored})
-
-
-def _columns(pairs: np.ndarray) -> np.ndarray:
-    """Minutes and seconds one after the other in the file, of dimensions (2, N) as the format counts them."""
-    return np.ascontiguousarray(pairs, dtype=float).reshape(-1).reshape(2, -1)
+    stored = pairs.reshape(2, -1)  # minutes and seconds in turns, of dimensions (2, N) as the format counts them
+    group = {"USED": np.array(len(times)), "CONTEXTS": contexts, "LABELS": labels, "TIMES": stored}
+    return c3d_bytes(POINTS, groups={"EVENT": group})
 
 
 @pytest.mark.parametrize(
