@@ -76,7 +76,7 @@ def make_cycles(request: CyclesRequest, progress: Progress = silent) -> Outcome:
     profile = profile_of(cut, bands) if bands else None
     about = _about(request, trials, cut, bands, profile, scalars)
     with together(out) as folder:
-        write_text_atomic(folder / "mean.csv", table(MEANS, _mean_rows(cut)))
+        write_text_atomic(folder / "mean.csv", table(MEANS, _mean_rows(cut, _filters(trials))))
         write_text_atomic(folder / "cycles.csv", table(CURVES, _curve_rows(cut)))
         write_text_atomic(folder / "figures.csv", table(SCALARS, (asdict(row).values() for row in scalars)))
         title = request.title or ", ".join(trial.name for trial in trials)
@@ -276,12 +276,14 @@ def _nothing(trials: Sequence[_Read]) -> str:
     return f"every cycle was left out ({'; '.join(why[:4])})" if why else "holds no whole cycle"
 
 
-def _mean_rows(cut: Sequence[CutCurve]) -> list[list[object]]:
+def _mean_rows(cut: Sequence[CutCurve], filtered: str) -> list[list[object]]:
     rows: list[list[object]] = []
     for c in cut:
         s = c.summary
         columns = (s.count, s.mean, s.sd, s.median, s.p5, s.p25, s.p75, s.p95)
-        rows += [[c.name, c.side, c.unit, k, int(s.count[k]), *(v[k] for v in columns[1:])] for k in range(101)]
+        rows += [
+            [c.name, c.side, c.unit, k, int(s.count[k]), *(v[k] for v in columns[1:]), filtered] for k in range(101)
+        ]
     return rows
 
 
@@ -305,8 +307,13 @@ def _z_rows(cut: Sequence[CutCurve], bands: Mapping[tuple[str, str], Band]) -> l
 
 def _note(trials: Sequence[_Read]) -> str:
     out = sum(not cycle.used for trial in trials for cycle in trial.cycles)
-    said = f"Mean and SD of the cycles; angles {trials[0].filter.words}."
+    said = f"Mean and SD of the cycles, degrees. {_filters(trials).capitalize()}."
     return f"{said} {out} cycle{'' if out == 1 else 's'} left out." if out else said
+
+
+def _filters(trials: Sequence[_Read]) -> str:
+    """The filter, or filters where each trial chose its own cut-off."""
+    return "; ".join(dict.fromkeys(trial.filter.words for trial in trials))
 
 
 def _about(
@@ -319,7 +326,7 @@ def _about(
 ) -> dict[str, Any]:
     return {
         "program": f"markerscope {__version__}",
-        "filter": trials[0].filter.words,
+        "filter": _filters(trials),
         "trials": [
             {
                 "trial": trial.name,
@@ -380,7 +387,7 @@ def _lines(trials: Sequence[_Read], scalars: Sequence[Scalar], profile: Profile 
         lines.append(f"{trial.name}: cycles {counted}; events told by {trial.told_by}.")
         lines += [f"  left out: {c.name}, {c.why_not}." for c in trial.cycles if not c.used]
         lines += [f"  Note: {note}" for note in trial.notes]
-    lines.append(f"Filter: {trials[0].filter.words}.")
+    lines.append(f"Filter: {_filters(trials)}.")
     rows = [row for row in _table_of(scalars) if row["quantity"] in DEFINITIONS]
     if rows:
         lines.append(f"  {'':18}{'left':>16}{'right':>16}")

@@ -12,7 +12,7 @@ import numpy as np
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.io.text import decode, read_bytes
 
-MEANS = ("quantity", "side", "unit", "percent", "n", "mean", "sd", "median", "p5", "p25", "p75", "p95")
+MEANS = ("quantity", "side", "unit", "percent", "n", "mean", "sd", "median", "p5", "p25", "p75", "p95", "filter")
 CURVES = ("trial", "cycle", "quantity", "side", "unit", "percent", "value")
 SCALARS = ("trial", "cycle", "side", "quantity", "unit", "value")
 

@@ -46,6 +46,7 @@ def write_angles(
         **({"neutral_pose": angles.neutral_pose} if relative else {}),
         **({"other_order": angles.hint} if angles.hint else {}),
         "units": {"time": "s", "angles": "degrees"},
+        "filter": "not filtered",
         "angles": [
             {
                 "column": name,

@@ -96,7 +96,9 @@ def test_ranges_peaks_and_their_times() -> None:
     curve = Curve("knee", "left", "degrees", time, 10 + 50 * np.sin(np.pi * (time % 1.0)) ** 2)
     (one,) = cut_all([("t", [curve], gait_cycles(EVENTS[:5]))])
     figures = {row.quantity: row.value for row in peaks_of(one)}
-    assert figures["knee range"] == pytest.approx(50, abs=0.01) and figures["knee maximum"] == pytest.approx(60, abs=0.01)
+    assert figures["knee range"] == pytest.approx(50, abs=0.01) and figures["knee maximum"] == pytest.approx(
+        60, abs=0.01
+    )
     assert figures["knee time of maximum"] == 50
     assert symmetry(40.0, 60.0) == pytest.approx(40.0)
     assert np.abs(curve.velocity.values[3:97]).max() == pytest.approx(50 * np.pi, rel=0.01)
@@ -138,7 +140,7 @@ def test_own_controls_count_people_and_not_cycles() -> None:
 
 def test_bands_are_read_as_the_means_are_written(tmp_path: Path) -> None:
     path = tmp_path / "mean.csv"
-    rows = [["knee", "left", "degrees", k, 5, 2.0 * k, 1.5, 0, 0, 0, 0, 0] for k in range(101)]
+    rows = [["knee", "left", "degrees", k, 5, 2.0 * k, 1.5, 0, 0, 0, 0, 0, "none"] for k in range(101)]
     path.write_text(table(MEANS, rows))
     mean, sd = read_bands(path)["knee", "left"]
     assert np.allclose(mean, 2.0 * np.arange(101)) and (sd == 1.5).all()

@@ -10,14 +10,14 @@ import pytest
 
 from markerscope.solver.commands.trial import events_of_trial, load_trial
 from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.skeleton import INDEX
 from markerscope.solver.events.event import Event, require_sense, strange, times_of
 from markerscope.solver.events.feet import Feet, Foot, feet_by_bone, feet_by_name
 from markerscope.solver.events.merge import merged
 from markerscope.solver.events.plates import contacts, events_of_plates
 from markerscope.solver.events.repetitions import find_repetitions
 from markerscope.solver.events.steps import find_steps
-from markerscope.solver.core.markers import Markers
-from markerscope.solver.core.skeleton import INDEX
 from markerscope.solver.io.force_plates import ForcePlate
 
 RATE, STRIDE, STANCE = 100.0, 1.1, 0.66
@@ -125,8 +125,10 @@ def test_a_plate_tells_the_foot_that_stood_on_it() -> None:
     events, notes = events_of_plates(feet, [loaded(time, true, true + STANCE, middle)])
     assert not notes
     assert [(e.side, e.kind) for e in events] == [("right", "foot_strike"), ("right", "foot_off")]
-    assert events[0].time == pytest.approx(true, abs=0.002) and events[1].time == pytest.approx(true + STANCE, abs=0.002)
-    far, notes = events_of_plates(feet, [loaded(time, true, true + STANCE, middle + [0, 3.0, 0])])
+    assert events[0].time == pytest.approx(true, abs=0.002) and events[1].time == pytest.approx(
+        true + STANCE, abs=0.002
+    )
+    far, notes = events_of_plates(feet, [loaded(time, true, true + STANCE, middle + np.array([0, 3.0, 0]))])
     assert not far and "near no foot" in notes[0]
 
 
@@ -144,7 +146,9 @@ def test_markers_find_heel_and_toe_by_name_or_by_bone() -> None:
     assert feet is not None and np.array_equal(feet.sides["right"].heel, markers.positions[:, 2])
     assert feet_by_name(replace(markers, labels=("a", "b", "c", "d", "e", "f"))) is None
     turn = np.broadcast_to(np.eye(3), (30, 24, 3, 3)).copy()
-    places = np.broadcast_to([[0, 0, -0.1], [0, 0, 0.2], [0, 0, 0.05], [1, 0, 0.2], [1, 0, -0.1], [0, 1, 0.0]], (30, 6, 3))
+    places = np.broadcast_to(
+        [[0, 0, -0.1], [0, 0, 0.2], [0, 0, 0.05], [1, 0, 0.2], [1, 0, -0.1], [0, 1, 0.0]], (30, 6, 3)
+    )
     on = np.array([INDEX[j] for j in ("left_ankle", "left_foot", "left_ankle", "right_foot", "right_ankle", "pelvis")])
     by_bone = feet_by_bone(replace(markers, positions=places), on, turn)
     assert by_bone is not None
