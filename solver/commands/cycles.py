@@ -361,14 +361,17 @@ def _about(
 
 def _table_of(scalars: Sequence[Scalar]) -> list[dict[str, Any]]:
     """Mean and SD of each figure on each side, and the symmetry index of the means."""
+    gathered: dict[tuple[str, str], dict[str, list[float]]] = {}
+    for scalar in scalars:
+        by_side = gathered.setdefault((scalar.quantity, scalar.unit), {})
+        if np.isfinite(scalar.value):
+            by_side.setdefault(scalar.side, []).append(scalar.value)
     rows = []
-    for quantity, unit in dict.fromkeys((row.quantity, row.unit) for row in scalars):
-        sides = {}
-        for side in ("left", "right", "general"):
-            own = np.array([row.value for row in scalars if row.quantity == quantity and row.side == side])
-            own = own[np.isfinite(own)]
-            if len(own):
-                sides[side] = {"mean": own.mean(), "sd": own.std(ddof=1) if len(own) > 1 else np.nan, "n": len(own)}
+    for (quantity, unit), by_side in gathered.items():
+        sides = {
+            side: {"mean": np.mean(own), "sd": np.std(own, ddof=1) if len(own) > 1 else np.nan, "n": len(own)}
+            for side, own in by_side.items()
+        }
         row: dict[str, Any] = {"quantity": quantity, "unit": unit, **sides}
         if {"left", "right"} <= set(sides) and "time of" not in quantity:
             row["symmetry_index_percent"] = symmetry(sides["left"]["mean"], sides["right"]["mean"])

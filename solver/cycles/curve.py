@@ -87,13 +87,17 @@ class Summary:
 
 def summary_of(values: np.ndarray) -> Summary:
     """Of curves (N, 101), NaN = not known."""
-    count = np.isfinite(values).sum(axis=0)
+    finite = np.isfinite(values)
+    count = finite.sum(axis=0)
     columns = np.full((7, values.shape[1]), np.nan)
-    for k in np.flatnonzero(count):
-        known = values[np.isfinite(values[:, k]), k]
-        columns[0, k] = known.mean()
-        columns[1, k] = known.std(ddof=1) if len(known) > 1 else np.nan
-        columns[2:, k] = np.percentile(known, [50, 5, 25, 75, 95])
+    for alike in np.unique(finite, axis=1).T:  # percents at which the same curves are known
+        if not alike.any():
+            continue
+        at = (finite == alike[:, None]).all(axis=0)
+        known = values[alike][:, at]
+        columns[0, at] = known.mean(axis=0)
+        columns[1, at] = known.std(axis=0, ddof=1) if len(known) > 1 else np.nan
+        columns[2:, at] = np.percentile(known, [50, 5, 25, 75, 95], axis=0)
     return Summary(count, *columns)
 
 
@@ -106,20 +110,31 @@ def cut_all(trials: Sequence[tuple[str, Sequence[Curve], Sequence[Cycle]]]) -> t
     """
     gathered: dict[tuple[str, str], tuple[Curve, list[np.ndarray], list[str], list[Cycle]]] = {}
     for trial, curves, cycles in trials:
-        for curve in curves:
-            for cycle in cycles:
-                if not cycle.used or (curve.side and cycle.side not in (curve.side, "general")):
-                    continue
+        for cycle in cycles:
+            own = [c for c in curves if cycle.used and (not c.side or cycle.side in (c.side, "general"))]
+            for curve, values in zip(own, _cut_together(own, cycle)):
                 side = curve.side or cycle.side
-                key = (curve.name, side)
-                _, values, names, own = gathered.setdefault(key, (curve, [], [], []))
-                values.append(cut(curve.time, curve.values, cycle))
+                _, rows, names, numbered = gathered.setdefault((curve.name, side), (curve, [], [], []))
+                rows.append(values)
                 names.append(trial)
-                own.append(cycle)
+                numbered.append(cycle)
     return tuple(
         CutCurve(name, side, curve.unit, np.array(values).reshape(-1, POINTS), tuple(names), tuple(own), curve.positive)
         for (name, side), (curve, values, names, own) in gathered.items()
     )
+
+
+def _cut_together(curves: Sequence[Curve], cycle: Cycle) -> list[np.ndarray]:
+    """(101,) of each curve, those on one clock in one go."""
+    clocks: dict[int, list[int]] = {}
+    for i, curve in enumerate(curves):
+        clocks.setdefault(id(curve.time), []).append(i)
+    out: list[np.ndarray] = [np.zeros(0)] * len(curves)
+    for own in clocks.values():
+        values = cut(curves[own[0]].time, np.stack([curves[i].values for i in own], axis=1), cycle)
+        for k, i in enumerate(own):
+            out[i] = values[:, k]
+    return out
 
 
 @dataclass(frozen=True)

@@ -154,17 +154,15 @@ def cut(time: np.ndarray, values: np.ndarray, cycle: Cycle, longest_gap: float =
     flat = values.reshape(len(values), -1)
     out = np.full((POINTS, flat.shape[1]), np.nan)
     step = float(np.median(np.diff(time)))
-    for k in range(flat.shape[1]):
-        good = np.isfinite(flat[:, k])
-        if good.sum() < 4:
-            continue
-        t, v = time[good], flat[good, k]
-        near = (t >= cycle.start - 1.0) & (t <= cycle.end + 1.0)
+    finite = np.isfinite(flat)
+    for good in np.unique(finite, axis=1).T:  # columns that are known in the same frames
+        columns = (finite == good[:, None]).all(axis=0)
+        near = good & (time >= cycle.start - 1.0) & (time <= cycle.end + 1.0)
         if near.sum() < 4:
             continue
-        t, v = t[near], v[near]
+        t = time[near]
         right = np.clip(np.searchsorted(t, wanted), 1, len(t) - 1)
         whole = (t[right] - t[right - 1] <= max(longest_gap, 1.5 * step)) & (wanted >= t[0] - 1e-6)
         whole &= wanted <= t[-1] + 1e-6
-        out[whole, k] = CubicSpline(t, v)(wanted[whole])
+        out[np.ix_(whole, columns)] = CubicSpline(t, flat[near][:, columns])(wanted[whole])
     return out.reshape(POINTS, *values.shape[1:])
