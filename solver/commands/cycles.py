@@ -369,7 +369,11 @@ def _table_of(scalars: Sequence[Scalar]) -> list[dict[str, Any]]:
     rows = []
     for (quantity, unit), by_side in gathered.items():
         sides = {
-            side: {"mean": np.mean(own), "sd": np.std(own, ddof=1) if len(own) > 1 else np.nan, "n": len(own)}
+            side: {
+                "mean": float(np.mean(own)),
+                "sd": float(np.std(own, ddof=1)) if len(own) > 1 else np.nan,
+                "n": len(own),
+            }
             for side, own in by_side.items()
         }
         row: dict[str, Any] = {"quantity": quantity, "unit": unit, **sides}

@@ -98,16 +98,21 @@ def write_events(path: Path, trial: Trial, events: tuple[Event, ...]) -> None:
         raise InputError(f"holds no {_LABELLED} to put events into", trial.path, "solve again, or write a .csv")
     data = read_bytes(source)
     if not looks_like_c3d(data):
-        data = _as_c3d(path, trial)
+        data = _as_c3d(trial)
     write_bytes_atomic(path, with_events(data, source, to_file(events)))
 
 
-def _as_c3d(path: Path, trial: Trial) -> bytes:
+def _as_c3d(trial: Trial) -> bytes:
+    """The markers alone, as a C3D."""
+    from tempfile import TemporaryDirectory
+
     from markerscope.solver.io.export_c3d import write_c3d
 
     assert trial.markers is not None
-    write_c3d(path, trial.markers)
-    return path.read_bytes()
+    with TemporaryDirectory() as folder:
+        made = Path(folder) / "markers.c3d"
+        write_c3d(made, trial.markers)
+        return made.read_bytes()
 
 
 def _counted(found: Found) -> str:
