@@ -85,7 +85,7 @@ def find_steps(feet: Feet, settings: StepSettings = DEFAULT, *, body: bool = Fal
     }
     ahead = heading(pelvis, list(ready.values()), rate)
     found = {side: _of_foot(foot, pelvis, ahead, rate, settings) for side, foot in ready.items()}
-    running = _runs({side: (strikes, offs) for side, (strikes, offs) in found.items()}, rate)
+    running = _runs(found, rate, settings)
     events, notes = [], []
     for side, (strikes, offs) in found.items():
         foot, place = ready[side], _swing(ready[side].centre, pelvis, ahead)
@@ -211,7 +211,7 @@ def _off_times(foot: Foot, frame: int, rate: float, settings: StepSettings, runn
     spring = -_derivative(_derivative(foot.toe[:, 2]))
     toe = _least(spring, frame - settings.toe_off * rate, rate, settings)
     if running:
-        return (toe,)
+        return (toe if np.isfinite(toe) else frame / rate,)
     return (frame / rate, _least(rise, frame, rate, settings), toe + settings.toe_off)
 
 
@@ -230,15 +230,25 @@ def _least(signal: np.ndarray, frame: float, rate: float, settings: StepSettings
     return float((first + k + np.clip(part, -0.5, 0.5)) / rate)
 
 
-def _runs(found: dict[str, tuple[list[int], list[int]]], rate: float) -> bool:
-    """Whether a foot is on the ground for less than half of a stride: nobody walks so, everybody runs so."""
-    shares = []
-    for strikes, offs in found.values():
+def _runs(found: dict[str, tuple[list[int], list[int]]], rate: float, settings: StepSettings) -> bool:
+    """Whether both feet are mostly off the ground between an off and the other foot's strike: nobody walks so.
+
+    Where one foot alone is known, whether it is on the ground for less than half of a stride.
+    """
+    late = settings.zeni_strike * rate
+    both: list[float] = []
+    shares: list[float] = []
+    for side, (strikes, offs) in found.items():
+        others = np.array([t for other, (times, _) in found.items() if other != side for t in times]) + late
+        if len(others):
+            both += [float(min(off - others, key=abs)) for off in offs]
         for a, b in pairwise(strikes):
             between = [t for t in offs if a < t < b]
             if len(between) == 1 and b - a < 2.5 * rate:
-                shares.append((between[0] - a) / (b - a))
-    return bool(shares) and float(np.median(shares)) < 0.45
+                shares.append((between[0] - a - late) / (b - a))
+    if both:
+        return float(np.median(both)) < 0
+    return bool(shares) and float(np.median(shares)) < 0.5
 
 
 def _swing(part: np.ndarray, pelvis: np.ndarray, ahead: np.ndarray) -> np.ndarray:

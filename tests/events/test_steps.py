@@ -17,7 +17,7 @@ from markerscope.solver.events.feet import Feet, Foot, feet_by_bone, feet_by_nam
 from markerscope.solver.events.merge import merged
 from markerscope.solver.events.plates import contacts, events_of_plates
 from markerscope.solver.events.repetitions import find_repetitions
-from markerscope.solver.events.steps import find_steps
+from markerscope.solver.events.steps import StepSettings, _runs, find_steps
 from markerscope.solver.io.force_plates import ForcePlate
 
 RATE, STRIDE, STANCE = 100.0, 1.1, 0.66
@@ -65,6 +65,13 @@ def test_every_step_is_found_wherever_somebody_walks(heading: float, treadmill: 
         offs = times_of(found, side, "foot_off")
         assert len(offs) >= len(true) - 1
     assert not strange(found)
+
+
+@pytest.mark.parametrize(("off", "runs"), [(66, False), (40, True)])
+def test_a_run_is_told_by_its_flight(off: int, runs: bool) -> None:
+    frames = {"left": ([0, 110], [off, off + 110]), "right": ([55, 165], [off + 55])}
+    assert _runs(frames, RATE, StepSettings()) == runs
+    assert _runs({"left": frames["left"]}, RATE, StepSettings()) == runs
 
 
 def test_a_foot_that_is_lost_takes_no_step_there() -> None:
