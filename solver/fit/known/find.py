@@ -64,7 +64,7 @@ def find(body: Body, known: KnownBody, points: np.ndarray) -> Found:
     points : (P, 3) m, internal lab frame, z up; some of the person's markers and whatever else was seen, NaN = lost
     """
     seen = np.flatnonzero(np.isfinite(points).all(axis=1))
-    starts = _rigid(body, known, points[seen])
+    starts = [start for _, start in promising(body, known, points[seen])]
     answers = sorted((_bent(body, known, points[seen], start) for start in starts), key=lambda found: found.cost)
     best = answers[0]
     links = [forward(body, Pose(a.rotations[None], a.trans[None], known.betas)) for a in answers]
@@ -74,8 +74,13 @@ def find(body: Body, known: KnownBody, points: np.ndarray) -> Found:
     return replace(best, match=match, next_cost=min(others, default=float("inf")))
 
 
-def _rigid(body: Body, known: KnownBody, points: np.ndarray) -> list[Pose]:
-    """The most promising starts: a pose, a heading, and a place, by nearest points."""
+def promising(body: Body, known: KnownBody, points: np.ndarray) -> list[tuple[float, Pose]]:
+    """The most promising starts: a pose, a heading, and a place, by nearest points; and what each costs, m2, ascending.
+
+    Parameters
+    ----------
+    points : (P, 3) m, all seen
+    """
     relaxed = anatomical.mean_pose().copy()
     relaxed[0] = _UPRIGHT
     library = np.concatenate([known.poses, relaxed[None]])
@@ -124,7 +129,7 @@ def _rigid(body: Body, known: KnownBody, points: np.ndarray) -> list[Pose]:
         rotations[0] = turn[s] @ rotations[0]
         # The pose stood with its root joint at its place of rest; turning about the markers' middle moves it.
         trans = turn[s] @ (root - about[pose, 0]) + place[s] - root
-        starts.append(Pose(rotations[None], trans[None], known.betas))
+        starts.append((float(cost[s]), Pose(rotations[None], trans[None], known.betas)))
     return starts
 
 
