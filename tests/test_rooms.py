@@ -35,6 +35,7 @@ ROOMS = (
     "solver.fit.labelled",
     "solver.fit.known",
     "solver.fit.published",
+    "solver.markerset",
     "solver.neural",
     "solver.neural.training",
     "solver.neural.per_layout",

@@ -10,6 +10,7 @@ from pathlib import Path
 from markerscope.app.cli.clean import clean_request
 from markerscope.app.cli.dataset import dataset_request
 from markerscope.app.cli.events import cycles_request, events_request
+from markerscope.app.cli.markersets import label_request, learn_request
 from markerscope.app.cli.output import Terminal
 from markerscope.app.cli.synth import synth_settings
 from markerscope.app.cli.train import train_request
@@ -29,6 +30,7 @@ from markerscope.solver.core.request import (
 from markerscope.solver.cycles.request import CyclesRequest
 from markerscope.solver.datasets.request import DatasetRequest
 from markerscope.solver.events.request import EventsRequest
+from markerscope.solver.markerset.request import LabelRequest, LearnRequest
 from markerscope.solver.neural.request import TrainRequest
 
 
@@ -72,6 +74,30 @@ def _clean(request: CleanRequest, progress: Progress) -> Outcome:
     from markerscope.solver.commands.clean import clean_file
 
     return clean_file(request, progress)
+
+
+def _label(request: LabelRequest, progress: Progress) -> Outcome:
+    from markerscope.solver.commands.label import label_file
+
+    return label_file(request, progress)
+
+
+def _list_marker_sets() -> Outcome:
+    from markerscope.solver.commands.markersets import list_marker_sets
+
+    return list_marker_sets()
+
+
+def _show_marker_set(named: str) -> Outcome:
+    from markerscope.solver.commands.markersets import show_marker_set
+
+    return show_marker_set(named)
+
+
+def _learn(request: LearnRequest, progress: Progress) -> Outcome:
+    from markerscope.solver.commands.markersets import learn_marker_set
+
+    return learn_marker_set(request, progress)
 
 
 def _train(request: TrainRequest, progress: Progress) -> Outcome:
@@ -118,6 +144,10 @@ class Services:
     train: Callable[[TrainRequest, Progress], Outcome] = _train
     events: Callable[[EventsRequest, Progress], Outcome] = _events
     cycles: Callable[[CyclesRequest, Progress], Outcome] = _cycles
+    label: Callable[[LabelRequest, Progress], Outcome] = _label
+    list_marker_sets: Callable[[], Outcome] = _list_marker_sets
+    show_marker_set: Callable[[str], Outcome] = _show_marker_set
+    learn: Callable[[LearnRequest, Progress], Outcome] = _learn
     no_window: Callable[[], str] = _no_window
     window: Callable[[Path | None, bool], int] = _window
 
@@ -216,6 +246,22 @@ def run_cycles(options: argparse.Namespace, services: Services) -> int:
     """``markerscope cycles``."""
     with Terminal(options) as terminal:
         terminal.show(services.cycles(cycles_request(options), terminal.progress))
+def run_label(options: argparse.Namespace, services: Services) -> int:
+    """``markerscope label``."""
+    with Terminal(options) as terminal:
+        terminal.show(services.label(label_request(options), terminal.progress))
+    return 0
+
+
+def run_markerset(options: argparse.Namespace, services: Services) -> int:
+    """``markerscope markerset list``, ``show`` and ``learn``."""
+    with Terminal(options) as terminal:
+        if options.doing == "list":
+            terminal.show(services.list_marker_sets())
+        elif options.doing == "show":
+            terminal.show(services.show_marker_set(options.marker_set))
+        else:
+            terminal.show(services.learn(learn_request(options), terminal.progress))
     return 0
 
 

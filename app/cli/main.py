@@ -24,6 +24,8 @@ from markerscope.app.cli.commands import (
     run_demo,
     run_evaluate,
     run_events,
+    run_label,
+    run_markerset,
     run_solve,
     run_synth,
     run_train,
@@ -31,6 +33,7 @@ from markerscope.app.cli.commands import (
 from markerscope.app.cli.dataset import dataset_options
 from markerscope.app.cli.endings import CANCELLED, REFUSED, ended
 from markerscope.app.cli.events import cycles_options, events_options
+from markerscope.app.cli.markersets import SET_HELP, label_options, markerset_options
 from markerscope.app.cli.output import standard_output
 from markerscope.app.cli.synth import synth_options
 from markerscope.app.cli.train import train_options
@@ -45,6 +48,8 @@ COMMANDS = {
     "evaluate": "how far a result is from another one or from a reference",
     "events": "foot strikes and offs of a trial, or repetitions of a movement",
     "cycles": "curves cut into cycles: mean and spread, steps in space and time, scores, a figure",
+    "label": "give trajectories the names of a marker set, breaks joined and exchanges mended",
+    "markerset": "list and show marker sets, and learn one from a labelled trial",
     "clean": "cut outliers and fill gaps of a marker file, every change listed",
     "bench": "how good the methods are on synthetic sessions whose truth is known",
     "synth": "make a session whose truth is known, as files",
@@ -116,6 +121,15 @@ def _parser() -> argparse.ArgumentParser:
     _common(clean)
     clean.set_defaults(run=run_clean)
 
+    label = commands.add_parser("label", help=COMMANDS["label"], description=_sentence("label"))
+    label_options(label)
+    _common(label)
+    label.set_defaults(run=run_label)
+
+    markerset = commands.add_parser("markerset", help=COMMANDS["markerset"], description=_sentence("markerset"))
+    markerset_options(markerset, _common)
+    markerset.set_defaults(run=run_markerset)
+
     evaluate = commands.add_parser("evaluate", help=COMMANDS["evaluate"], description=_sentence("evaluate"))
     evaluate.add_argument("result", type=Path, metavar="RESULT", help="folder that solve wrote, or its motion.npz")
     evaluate.add_argument("reference", type=Path, metavar="REFERENCE", help="another result, npz, stageii.pkl or .mot")
@@ -163,6 +177,7 @@ def _solve_options(solve: argparse.ArgumentParser) -> None:
     inputs.add_argument("--video", type=Path, metavar="FILE", help="video of the same movement")
     inputs.add_argument("--prior", type=Path, metavar="FILE", help="poses by 4D-Humans, WHAM, GVHMR, TRAM; AMASS npz")
     inputs.add_argument("--camera", type=Path, metavar="RESULT", help="take the camera from another trial's result")
+    inputs.add_argument("--marker-set", metavar="NAME|FILE", help=f"name the markers first: {SET_HELP}")
     inputs.add_argument("--body", type=Path, metavar="FILE", help="an SMPL-layout model instead of the embedded body")
 
     reading = solve.add_argument_group("reading the markers (by default as the file says, else guessed and reported)")

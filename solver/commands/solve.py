@@ -58,6 +58,12 @@ def solve_session(request: SolveRequest, progress: Progress = silent, on_event: 
     InputError : an input cannot be used; nothing half-written is left
     EditedOutside : somebody has changed the session file meanwhile; results stay, files are not written
     """
+    if request.marker_set is not None:
+        from markerscope.solver.commands.named import named_first
+
+        request, said = named_first(request, part_of(progress, 0.0, 0.4))
+        outcome = solve_session(request, part_of(progress, 0.4, 1.0), on_event)
+        return replace(outcome, lines=(*said, *outcome.lines))
     loaded, folder = session_folder(request.markers), _folder(request)
     state = state_of(folder)
     if folder != loaded and edited_by_hand(folder):

@@ -33,6 +33,8 @@ class SolveRequest:
     video : video of the same movement
     prior : poses reconstructed from the video by another program, instead of the embedded network's
     camera : result folder of another trial of the same session, to take the camera from
+    marker_set : name of a marker set that ships, or a file, by which the markers are named before the solve; without a
+        video or a prior, the pose that this finds is the prior
     offset, rate_ratio : s and 1, marker time = rate_ratio * video time + offset
     up : vertical axis of the marker file
     units : length unit of the marker file
@@ -56,6 +58,7 @@ class SolveRequest:
     video: Path | None = None
     prior: Path | None = None
     camera: Path | None = None
+    marker_set: str | None = None
     offset: float | None = None
     rate_ratio: float | None = None
     up: Up | None = None

@@ -11,7 +11,7 @@ from markerscope.solver.markerset.fragments import SOFT, START, Fragments
 
 _OVERLAP = 2
 """Frames that two fragments of one name may share where a break was tracked twice."""
-_NOBODY = 0.6
+NOBODY = 0.6
 """What a sample without a name costs; one as far from its place as it may be costs 1."""
 _STAY = {SOFT: 12.0, START: 0.0}
 _LEAVES = 2.0
@@ -44,7 +44,7 @@ class Pieces:
         return len(self.first)
 
 
-def pieces_of(fragments: Fragments, cost: np.ndarray) -> Pieces:
+def pieces_of(fragments: Fragments, cost: np.ndarray, nobody: float = NOBODY) -> Pieces:
     """Fragments joined along each trajectory unless another name fits clearly better behind a cut (Viterbi).
 
     Parameters
@@ -55,7 +55,7 @@ def pieces_of(fragments: Fragments, cost: np.ndarray) -> Pieces:
     number = -1
     for column in np.unique(fragments.column):
         own = np.flatnonzero(fragments.column == column)
-        path = _path(cost[own], fragments.length[own], fragments.cut[own])
+        path = _path(cost[own], fragments.length[own], fragments.cut[own], nobody)
         for i, f in enumerate(own):
             number += i == 0 or path[i] != path[i - 1]
             piece[f] = number
@@ -71,9 +71,9 @@ def pieces_of(fragments: Fragments, cost: np.ndarray) -> Pieces:
     return Pieces(piece, first, last, columns, samples, total / np.maximum(samples, 1)[:, None])
 
 
-def _path(cost: np.ndarray, length: np.ndarray, cut: np.ndarray) -> np.ndarray:
+def _path(cost: np.ndarray, length: np.ndarray, cut: np.ndarray, nobody: float) -> np.ndarray:
     """(F,) cheapest names along one trajectory, U where it is nobody's."""
-    table = np.concatenate([cost, np.full((len(cost), 1), _NOBODY)], axis=1) * length[:, None]
+    table = np.concatenate([cost, np.full((len(cost), 1), nobody)], axis=1) * length[:, None]
     total, back = table[0], []
     for i in range(1, len(table)):
         leave = total.min() + _STAY.get(int(cut[i]), _LEAVES)
@@ -85,7 +85,7 @@ def _path(cost: np.ndarray, length: np.ndarray, cut: np.ndarray) -> np.ndarray:
     return np.array(path[::-1])
 
 
-def assign(pieces: Pieces) -> np.ndarray:
+def assign(pieces: Pieces, nobody: float = NOBODY) -> np.ndarray:
     """(P,) name of each piece, -1 for nobody's: Hungarian between every two ends of pieces, the longest stretch counts.
 
     Where two pieces of one name still overlap, the one that it suits less takes its next best free name or none.
@@ -93,12 +93,12 @@ def assign(pieces: Pieces) -> np.ndarray:
     count, names = pieces.cost.shape
     won = np.zeros((count, names + 1))
     for start, stop, active in stretches(pieces):
-        columns = _matched(pieces.cost[active], pieces.samples[active])
+        columns = _matched(pieces.cost[active], pieces.samples[active], nobody)
         won[active, columns] += stop - start + 1
     won[:, names] *= 1 - 1e-9
     chosen = np.where(won.sum(axis=1) > 0, won.argmax(axis=1), names)
     chosen[chosen == names] = -1
-    return _one_to_one(pieces, chosen)
+    return _one_to_one(pieces, chosen, nobody)
 
 
 def stretches(pieces: Pieces) -> list[tuple[int, int, np.ndarray]]:
@@ -115,16 +115,16 @@ def stretches(pieces: Pieces) -> list[tuple[int, int, np.ndarray]]:
     return found
 
 
-def _matched(cost: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _matched(cost: np.ndarray, weight: np.ndarray, nobody: float) -> np.ndarray:
     """(A,) the name of each of A pieces, U for none."""
     pieces, names = cost.shape
-    table = np.full((pieces, names + pieces), _NOBODY)
+    table = np.full((pieces, names + pieces), nobody)
     table[:, :names] = cost
     _, columns = linear_sum_assignment(table * weight[:, None])
     return np.minimum(columns, names)
 
 
-def _one_to_one(pieces: Pieces, chosen: np.ndarray) -> np.ndarray:
+def _one_to_one(pieces: Pieces, chosen: np.ndarray, nobody: float) -> np.ndarray:
     """Names without overlaps."""
     out = np.full(len(chosen), -1)
     taken: dict[int, list[int]] = {}
@@ -135,7 +135,7 @@ def _one_to_one(pieces: Pieces, chosen: np.ndarray) -> np.ndarray:
             for q in taken.get(name, [])
         )
 
-    worth = pieces.samples * (_NOBODY - pieces.cost[np.arange(len(chosen)), np.maximum(chosen, 0)])
+    worth = pieces.samples * (nobody - pieces.cost[np.arange(len(chosen)), np.maximum(chosen, 0)])
     for p in np.argsort(-worth, kind="stable"):
         if chosen[p] < 0:
             continue

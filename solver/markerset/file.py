@@ -56,7 +56,9 @@ def text_of(marker_set: MarkerSet) -> str:
         row |= {"plate": marker.plate} if marker.plate else {}
         row |= {"landmark": marker.landmark} if marker.landmark else {}
         cells = [tomli_w.dumps({key: value}).strip().replace("\n", " ") for key, value in row.items()]
-        lines.append("    { " + ", ".join(cells).replace("[     ", "[").replace(", ]", "]").replace(",     ", ", ") + " },")
+        lines.append(
+            "    { " + ", ".join(cells).replace("[     ", "[").replace(", ]", "]").replace(",     ", ", ") + " },"
+        )
     return tomli_w.dumps(head) + "markers = [\n" + "\n".join(lines) + "\n]\n"
 
 

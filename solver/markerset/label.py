@@ -11,7 +11,7 @@ from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.progress import Progress, part_of, silent
 from markerscope.solver.fit.kinematics import Points, Pose
-from markerscope.solver.markerset.assign import Pieces, assign, margins, pieces_of
+from markerscope.solver.markerset.assign import NOBODY, Pieces, assign, margins, pieces_of
 from markerscope.solver.markerset.fragments import Fragments, cut_up
 from markerscope.solver.markerset.held import follow, interpolated, reshape, where
 from markerscope.solver.markerset.marker_set import FEWEST, MarkerSet
@@ -20,9 +20,13 @@ from markerscope.solver.markerset.search import Seen, only, search
 _HZ = 25.0
 _SAME_M = 0.010
 """Someone whose markers are this near in the best frames is the person the set was learnt on."""
-_GATES_M = (0.20, 0.15, 0.12, 0.10, 0.08, 0.07)
+_GATES_M = (0.20, 0.15, 0.12, 0.10)
+_WIDE_M = 0.30
+_SAME_GATE_M = 0.06
 _FOLLOWED_M = (0.045, 0.04, 0.035)
-_FOLLOWED_OTHER_M = (0.10, 0.08, 0.07, 0.06)
+_FOLLOWED_OTHER_M = (0.10, 0.10, 0.09, 0.08)
+_HARDLY = 0.95
+"""What a sample without a name costs while the person's shape is not known yet, so that all find one."""
 _STRAY_M = 0.020
 _PLATE_STRAY_M = 0.040
 _GOOD = 1.8
@@ -87,19 +91,8 @@ def label(body: Body, marker_set: MarkerSet, markers: Markers, progress: Progres
     fragments = cut_up(positions, markers.rate)
     work = _Work(body, marker_set, points, positions, fragments, same)
     frames = np.array([one.frame for one in begun])
-    pose = Pose(
-        np.stack([one.found.rotations for one in begun]), np.stack([one.found.trans for one in begun]), betas
-    )
-    names = work.voted(begun)
-    placement = points
-    for gate in _GATES_M[-1:] if same else _GATES_M:
-        named = work.named(names, frames)
-        if not same:
-            pose, placement = reshape(body, points, work.stray, named, pose, gate is _GATES_M[-1])
-        else:
-            pose = follow(body, placement, named, np.arange(len(frames)), pose)
-        cost = work.cost(where(body, placement, pose), frames, gate)
-        names = work.assigned(cost)
+    pose = Pose(np.stack([one.found.rotations for one in begun]), np.stack([one.found.trans for one in begun]), betas)
+    names, pose, placement, _ = begin(work, begun, pose, frames)
     stride = max(1, round(markers.rate / _HZ))
     every = np.unique(np.append(np.arange(0, len(positions), stride), len(positions) - 1))
     every = np.union1d(every, frames)
@@ -131,6 +124,39 @@ def label(body: Body, marker_set: MarkerSet, markers: Markers, progress: Progres
     return Labelled(marker_set.names, name, sure, full, placement, same, ())
 
 
+def begin(work: _Work, seen: list[Seen], pose: Pose, frames: np.ndarray) -> tuple[np.ndarray, Pose, Points, float]:
+    """Names, poses of the frames, and places, from the frames that the person was found in; of someone whose shape is
+    not known by several ways, the cheapest."""
+    if work.same:
+        return _relaxed(work, seen, pose, frames, (_SAME_GATE_M,))
+    best = sorted(seen, key=lambda one: one.cost)
+    wide = (_WIDE_M, *_GATES_M)
+    ways = ((seen, _GATES_M), (seen, wide), (best[: max(2, len(best) // 2)], wide), (best[:1], wide))
+    return min((_relaxed(work, chosen, pose, frames, gates) for chosen, gates in ways), key=lambda one: one[3])
+
+
+def _relaxed(
+    work: _Work, seen: list[Seen], pose: Pose, frames: np.ndarray, gates: tuple[float, ...]
+) -> tuple[np.ndarray, Pose, Points, float]:
+    """One way from votes to names, and what it costs a sample."""
+    placement = work.points
+    names = work.voted(seen)
+    for gate in gates:
+        named = work.named(names, frames)
+        if work.same:
+            pose = follow(work.body, placement, named, np.arange(len(frames)), pose)
+        else:
+            pose, placement = reshape(work.body, work.points, work.stray, named, pose, gate == gates[-1])
+        cost = work.cost(where(work.body, placement, pose), frames, gate)
+        names = work.assigned(cost, _HARDLY)
+    length = work.fragments.length
+    there = np.isin(np.arange(len(length)), work.sample[frames])
+    each = np.where(names >= 0, cost[np.arange(len(cost)), np.maximum(names, 0)], 1.0)
+    away = np.linalg.norm(placement.rest - work.points.rest, axis=1) / work.stray
+    worth = float((each * length)[there].sum() / length[there].sum()) + 0.05 * float(np.minimum(away**2, 9).mean())
+    return names, pose, placement, worth
+
+
 def _off(seen: list[Seen]) -> float:
     """m, what a matched marker is off in the better half of the frames."""
     return float(np.median([one.cost for one in seen[: max(1, len(seen) // 2)]]))
@@ -157,9 +183,9 @@ class _Work:
         for one in begun:
             match = only(one, self.count)
             for u in np.flatnonzero(match >= 0):
-                votes[self.sample[one.frame, match[u]], u] += 0.01 / (0.01 + one.cost)
-        share = votes / max(len(begun), 1)
-        return self.assigned(1.0 - share)
+                votes[self.sample[one.frame, match[u]], u] += 1.0 / (0.01 + one.cost)
+        most = votes.sum(axis=1, keepdims=True)
+        return self.assigned(1.0 - votes / np.maximum(most, 1e-9))
 
     def named(self, names: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """(W, U, 3) m of each name in some frames."""
@@ -195,10 +221,10 @@ class _Work:
             chosen &= since % stride[np.maximum(sample, 0)] == 0
         return [np.flatnonzero(row) for row in chosen]
 
-    def assigned(self, cost: np.ndarray) -> np.ndarray:
+    def assigned(self, cost: np.ndarray, nobody: float = NOBODY) -> np.ndarray:
         """(F,) names."""
-        self.pieces = pieces_of(self.fragments, cost)
-        self.piece_names = assign(self.pieces)
+        self.pieces = pieces_of(self.fragments, cost, nobody)
+        self.piece_names = assign(self.pieces, nobody)
         return self.piece_names[self.pieces.of_fragment]
 
     def probability(self, pose: Pose, names: np.ndarray, rate: float) -> np.ndarray:

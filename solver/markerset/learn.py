@@ -39,8 +39,10 @@ def learn_from_motion(body: Body, markers: Markers, motion: FittedMotion, name: 
     return learn_from_pose(body, markers, pose, name, source)
 
 
-def learn_from_pose(body: Body, markers: Markers, pose: Pose, name: str, source: str = "") -> MarkerSet:
-    """The set of a trial whose poses, one a frame, are known."""
+def learn_from_pose(
+    body: Body, markers: Markers, pose: Pose, name: str, source: str = "", said: tuple[str, ...] = ()
+) -> MarkerSet:
+    """The set of a trial whose poses, one a frame, are known; ``said`` goes first among its notes."""
     frames = np.unique(np.linspace(0, len(pose.trans) - 1, _MOST_FRAMES).astype(int))
     some = pose.at(frames)
     positions = markers.positions[frames]
@@ -65,7 +67,8 @@ def learn_from_pose(body: Body, markers: Markers, pose: Pose, name: str, source:
     notes = (f"Not on the body, or hardly seen, and left out: {', '.join(left_out)}.",) if left_out else ()
     plates = _plates(markers, found)
     named = tuple(SetMarker(m.name, m.bone, m.place, m.spread, plates.get(m.name, "")) for m in found)
-    return MarkerSet(name, named, tuple(np.round(pose.betas, 4).tolist()), "learnt", source or markers.source, notes)
+    shape = tuple(np.round(pose.betas, 4).tolist())
+    return MarkerSet(name, named, shape, "learnt", source or markers.source, (*said, *notes))
 
 
 def _vertex(body: Body, pose: Pose, track: np.ndarray, skin: Skin) -> int:
