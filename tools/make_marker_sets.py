@@ -3,8 +3,8 @@
     python tools/make_marker_sets.py
 
 Each place is a palpable landmark of the body, a point between landmarks, or a rough place that is then brought onto the
-skin of its bone; the marker's centre is 9.5 mm above the skin there (Ghorbani and Black 2021). Spreads are round figures:
-how far the same landmark, palpated on different people, ends from its place on a fitted body.
+skin of its bone; the marker's centre is 9.5 mm above the skin there (Ghorbani and Black 2021). Spreads are round
+figures: how far the same landmark, palpated on different people, ends from its place on a fitted body.
 """
 
 from __future__ import annotations
@@ -155,9 +155,12 @@ def main() -> None:
         write_marker_set(OUT / f"{name}.toml", MarkerSet(name, markers, (), "shipped", source, notes))
 
 
-def _marker(places: dict[str, tuple[int, np.ndarray, float, str]], key: str):  # noqa: ANN202
+def _marker(
+    places: dict[str, tuple[int, np.ndarray, float, str]], key: str
+) -> tuple[int, tuple[float, float, float], float, str, str]:
     bone, place, spread, words = places[key]
-    return bone, tuple(np.round(place, 4).tolist()), spread, "", words
+    x, y, z = np.round(place, 4).tolist()
+    return bone, (x, y, z), spread, "", words
 
 
 def _places() -> dict[str, tuple[int, np.ndarray, float, str]]:

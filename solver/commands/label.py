@@ -161,8 +161,8 @@ def _lines(markers: Markers, found: Labelled, ordered: Ordered) -> tuple[str, ..
     absent = [name for name in found.names if name not in there]
     person = "the person that the set was learnt on" if found.same_person else "another person than the set's"
     lines = [
-        f"{len(there)} of the set's {len(found.names)} names were found, on {person}: {100 * named.sum() / seen:.1f} % of "
-        f"the samples are named, {100 * sure.sum() / seen:.1f} % with a probability of at least {CERTAIN:g}."
+        f"{len(there)} of the set's {len(found.names)} names were found, on {person}: {100 * named.sum() / seen:.1f} % "
+        f"of the samples are named, {100 * sure.sum() / seen:.1f} % with a probability of at least {CERTAIN:g}."
     ]
     if absent:
         lines.append(f"Not found: {_some(absent)}.")

@@ -1,4 +1,4 @@
-"""A solve whose markers are named by a marker set first: breaks joined and exchanges mended before anything is fitted."""
+"""A solve whose markers are named by a marker set first, breaks joined and exchanges mended."""
 
 from __future__ import annotations
 

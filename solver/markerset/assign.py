@@ -103,7 +103,8 @@ def assign(pieces: Pieces, nobody: float = NOBODY) -> np.ndarray:
 
 def stretches(pieces: Pieces) -> list[tuple[int, int, np.ndarray]]:
     """First and last frame between two ends of pieces, and the pieces that are there; an overlap of two frames is
-    none."""
+    none.
+    """
     first = pieces.first + np.where(pieces.last - pieces.first >= 2 * _OVERLAP, _OVERLAP // 2, 0)
     last = pieces.last - np.where(pieces.last - pieces.first >= 2 * _OVERLAP, _OVERLAP // 2, 0)
     marks = np.unique(np.concatenate([first, last + 1]))
@@ -148,8 +149,8 @@ def _one_to_one(pieces: Pieces, chosen: np.ndarray, nobody: float) -> np.ndarray
 
 
 def margins(pieces: Pieces, names: np.ndarray, evidence: np.ndarray, nobody: np.ndarray) -> np.ndarray:
-    """(P,) how much dearer an assignment is in which a piece has another name or none: the min-marginals, over exchanges
-    of two and of three.
+    """(P,) how much dearer an assignment is in which a piece has another name or none: the min-marginals, over
+    exchanges of two and of three.
 
     Longer chains are left out: they are dearer, and where the names were given by another measure than the evidence, a
     chain elsewhere that gains would be charged to all.

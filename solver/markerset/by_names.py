@@ -79,7 +79,8 @@ def pose_by_names(body: Body, markers: Markers, progress: Progress = silent) -> 
     names = np.array(marker_set.names)
     odd = [f"{names[u]} ({1000 * off[u]:.0f} mm)" for u in np.flatnonzero(off > _CONTRADICTS_M)]
     notes = (
-        f"Far from where the names usually are, as if they were exchanged or mean something else here: {', '.join(odd)}.",
+        "Far from where the names usually are, as if they were exchanged or mean something else here: "
+        f"{', '.join(odd)}.",
     )
     return ByNames(full, marker_set.name, len(columns), notes if odd else ())
 

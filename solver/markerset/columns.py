@@ -25,8 +25,8 @@ class Stretch:
     first, last : frames from 0, both inclusive
     name : of the set, empty where it is nobody's
     probability : that the name is right; NaN where there is none
-    what : ``named`` in its own trajectory, ``joined`` from another one into it, ``exchanged`` with another, ``proposed``
-        where the name is not sure enough to move it, ``unlabelled``
+    what : ``named`` in its own trajectory, ``joined`` from another one into it, ``exchanged`` with another,
+        ``proposed`` where the name is not sure enough to move it, ``unlabelled``
     into : number of the trajectory that holds it now
     """
 
@@ -72,6 +72,7 @@ def in_order(markers: Markers, labelled: Labelled) -> Ordered:
             kept.append(run)
     names = list(markers.labels)
     owner = {column: name for name, column in home.items()}
+    present = np.asarray(markers.present)
     width = count
     out = np.full((len(positions), count + len(kept), 3), np.nan)
     filled = None if markers.filled is None else np.zeros(out.shape[:2], bool)
@@ -81,7 +82,7 @@ def in_order(markers: Markers, labelled: Labelled) -> Ordered:
     def put(run: tuple[int, int, int, int, float], into: int, what: str) -> None:
         column, first, last, name, probability = run
         span = slice(first, last + 1)
-        there = markers.present[span, column]
+        there = present[span, column]
         out[span, into][there] = positions[span, column][there]
         busy[span, into] |= there
         if filled is not None and markers.filled is not None:
@@ -103,7 +104,7 @@ def in_order(markers: Markers, labelled: Labelled) -> Ordered:
     for run in kept:
         column, first, last, name, _ = run
         span = slice(first, last + 1)
-        there = markers.present[span, column]
+        there = present[span, column]
         what = "unlabelled" if name < 0 else "proposed"
         free = lambda c: not busy[span, c][there].any()  # noqa: E731,B023
         if column not in owner and free(column):
@@ -150,8 +151,8 @@ def _homes(labelled: Labelled, count: int, runs: list[tuple[int, int, int, int, 
         if name >= 0:
             held[name, column] += last - first + 1
     found = np.flatnonzero(held.any(axis=1))
-    row, column = linear_sum_assignment(-held[found])
-    return {int(found[r]): int(c) for r, c in zip(row, column) if held[found[r], c] > 0}
+    rows, columns = linear_sum_assignment(-held[found])
+    return {int(found[r]): int(c) for r, c in zip(rows, columns) if held[found[r], c] > 0}
 
 
 def _labels(names: list[str], owner: dict[int, int], of_set: tuple[str, ...]) -> tuple[str, ...]:
@@ -174,7 +175,8 @@ def _labels(names: list[str], owner: dict[int, int], of_set: tuple[str, ...]) ->
 
 def contradictions(markers: Markers, labelled: Labelled) -> tuple[str, ...]:
     """What the file's own names and the set's disagree about, one sentence each: two of them exchanged, or one that
-    means another place."""
+    means another place.
+    """
     known = {name: u for u, name in enumerate(labelled.names)}
     means: dict[str, str] = {}
     for column, own in enumerate(markers.labels):

@@ -79,12 +79,12 @@ def _jumps(positions: np.ndarray, present: np.ndarray, rate: float) -> tuple[np.
     hard, soft = np.zeros((frames, count), bool), np.zeros((frames, count), bool)
     if frames < 4:
         return hard, soft
-    scale = max(1.0, (_USUAL_HZ / rate) ** 2) if rate < _USUAL_HZ else 1.0
+    scale = max(1.0, _USUAL_HZ / rate)  # a cut too many costs nothing, one too few a wrong name
     # How far each step leaves the way before it, and the way behind it the step.
     step = np.diff(positions, axis=0)
     bend = np.full((frames, count), np.nan)
     bend[1:-1] = np.linalg.norm(step[1:] - step[:-1], axis=2)
-    usual = np.nan_to_num(np.nanmedian(bend, axis=0), nan=0.0) if np.isfinite(bend).any() else np.zeros(count)
+    usual = np.array([np.median(own[np.isfinite(own)]) if np.isfinite(own).any() else 0.0 for own in bend.T])
     # A jump between t - 1 and t bends the way at t - 1 and at t, both by its length.
     both = np.full((frames, count), np.nan)
     both[1:] = np.fmin(bend[:-1], bend[1:])

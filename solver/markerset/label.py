@@ -126,7 +126,8 @@ def label(body: Body, marker_set: MarkerSet, markers: Markers, progress: Progres
 
 def begin(work: _Work, seen: list[Seen], pose: Pose, frames: np.ndarray) -> tuple[np.ndarray, Pose, Points, float]:
     """Names, poses of the frames, and places, from the frames that the person was found in; of someone whose shape is
-    not known by several ways, the cheapest."""
+    not known by several ways, the cheapest.
+    """
     if work.same:
         return _relaxed(work, seen, pose, frames, (_SAME_GATE_M,))
     best = sorted(seen, key=lambda one: one.cost)
@@ -198,7 +199,8 @@ class _Work:
 
     def cost(self, model: np.ndarray, frames: np.ndarray, gate: float) -> np.ndarray:
         """(F, U) mean squared distance of each fragment's samples from each name's place, over that of the gate, at
-        most 1. Fragments that are in none of the frames: 1."""
+        most 1. Fragments that are in none of the frames: 1.
+        """
         total, count = np.zeros((len(self.fragments), self.count)), np.zeros(len(self.fragments))
         looked = self._looked(frames)
         for i, frame in enumerate(frames):

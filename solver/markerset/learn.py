@@ -13,6 +13,7 @@ from markerscope.solver.fit.results import FittedMotion
 from markerscope.solver.markerset.marker_set import MarkerSet, SetMarker
 
 _MOST_FRAMES = 120
+_LOOKED_AT = 12
 _LEAST_SEEN = 5
 _FAR_M = 0.08
 """A trajectory whose place on the body wanders by more is no marker on it."""
@@ -48,15 +49,17 @@ def learn_from_pose(
     positions = markers.positions[frames]
     found: list[SetMarker] = []
     left_out: list[str] = []
-    links = forward(body, some)
     skin = Skin(body, pose.betas)
+    looked = np.unique(np.linspace(0, len(frames) - 1, _LOOKED_AT).astype(int))
+    vertices, _ = body.pose(some.rotations[looked], some.betas, some.trans[looked])
+    surfaces = vertices[:, skin.index]
     for m, label in enumerate(markers.labels):
         seen = np.isfinite(positions[:, m]).all(axis=1)
         if seen.sum() < _LEAST_SEEN:
             left_out.append(label)
             continue
-        vertex = _vertex(body, some.at(seen), positions[seen, m], skin)
-        place, strays = _place(body, links, some, seen, positions[:, m], vertex)
+        vertex = _vertex(body, some.at(seen), positions[seen, m], skin, surfaces, positions[looked, m])
+        place, strays = _place(body, some, seen, positions[:, m], vertex)
         if strays > _FAR_M:
             left_out.append(label)
             continue
@@ -71,13 +74,22 @@ def learn_from_pose(
     return MarkerSet(name, named, shape, "learnt", source or markers.source, (*said, *notes))
 
 
-def _vertex(body: Body, pose: Pose, track: np.ndarray, skin: Skin) -> int:
-    """The vertex that a trajectory stays nearest to in a constant offset: of those often nearest, the steadiest."""
-    vertices, _ = body.pose(pose.rotations, pose.betas, pose.trans)
+def _vertex(body: Body, pose: Pose, track: np.ndarray, skin: Skin, surfaces: np.ndarray, looked: np.ndarray) -> int:
+    """The vertex that a trajectory stays nearest to in a constant offset: of those often nearest, the steadiest.
+
+    Parameters
+    ----------
+    pose, track : the frames in which it is seen, and (F, 3) m where
+    surfaces, looked : (K, V, 3) m the skin in some frames, and (K, 3) m the marker in them, NaN = lost
+    """
     near: set[int] = set()
-    for surface, point in zip(vertices[:: max(1, len(vertices) // 12)], track[:: max(1, len(track) // 12)]):
-        away = ((surface[skin.index] - point) ** 2).sum(axis=1)
-        near |= {int(skin.index[i]) for i in np.argsort(away)[:3]}
+    for surface, point in zip(surfaces, looked):
+        if not np.isfinite(point).all():
+            continue
+        away = ((surface - point) ** 2).sum(axis=1)
+        near |= {int(skin.index[i]) for i in np.argpartition(away, 3)[:3]}
+    if not near:
+        near = {int(skin.index[0])}
     chosen = np.array(sorted(near))
     points = Points.of_vertices(body, chosen)
     links = forward(body, pose)
@@ -89,9 +101,7 @@ def _vertex(body: Body, pose: Pose, track: np.ndarray, skin: Skin) -> int:
     return int(chosen[wander.argmin()])
 
 
-def _place(
-    body: Body, links: object, pose: Pose, seen: np.ndarray, track: np.ndarray, vertex: int
-) -> tuple[np.ndarray, float]:
+def _place(body: Body, pose: Pose, seen: np.ndarray, track: np.ndarray, vertex: int) -> tuple[np.ndarray, float]:
     """(3,) m on the shaped rest body, and how far the trajectory strays from it in the median frame, m."""
     some = pose.at(seen)
     own = forward(body, some)

@@ -88,7 +88,7 @@ class MarkerSet:
         return np.array([marker.spread for marker in self.markers], dtype=float)
 
     def shape(self, body: Body) -> np.ndarray:
-        """(S,) shape coefficients of the rest body that the places are on; the mean where the set has another body's."""
+        """(S,) shape of the rest body that the places are on; the mean where the set has another body's."""
         known = np.array(self.betas, dtype=float)
         return known if len(known) == body.shape_count else np.zeros(body.shape_count)
 

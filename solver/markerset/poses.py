@@ -35,7 +35,7 @@ _DEGREES: tuple[dict[str, tuple[float, float, float]], ...] = (
         "left_shoulder": (0, -20, -65), "right_shoulder": (0, -15, 65),
     },
 )  # fmt: skip
-"""Rotation vectors of the joints that differ from the relaxed pose; +x bends hips back and knees, as in the rest body."""
+"""Rotation vectors of the joints that differ from the relaxed pose; +x bends the knees and hips backwards."""
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,6 +22,8 @@ _WHOLE_SHARE = 0.8
 _PARTS_KEPT = 10
 _MOST_OVER = 1.5
 _REACH_M = 0.04
+_CLEAR_M, _CLEAR, _ENOUGH_CLEAR = 0.008, 1.5, 4
+"""m, times the next different answer, frames: so sure, no more are looked at."""
 _ABSENT = 0.35
 """What a place without a point costs, beside a point without a place."""
 
@@ -66,12 +68,20 @@ def search(
         parts += _likely_parts(body, points, betas, bones, positions[some], typical)
     if len(parts) > 1:
         parts = _best_parts(body, points, betas, parts, positions, frames, progress)
-    seen = []
-    for i, frame in enumerate(frames):
+    seen: list[Seen] = []
+    for i, frame in enumerate(frames[_spread_order(len(frames))]):
         progress(i / len(frames), "looking for the person")
         tries = [_seen(body, points, betas, part, positions[frame], int(frame)) for part in parts]
         seen.append(min(tries, key=lambda one: one.cost))
+        if sum(one.cost < _CLEAR_M and one.found.next_cost > _CLEAR * one.cost for one in seen) >= _ENOUGH_CLEAR:
+            break
     return sorted(seen, key=lambda one: one.cost)
+
+
+def _spread_order(count: int) -> np.ndarray:
+    """0 to count - 1, so that those that come first are spread over all."""
+    order = sorted(range(count), key=lambda i: f"{i:016b}"[::-1])
+    return np.array(order, int)
 
 
 def _known(points: Points, betas: np.ndarray, part: np.ndarray) -> KnownBody:
@@ -84,7 +94,7 @@ def _seen(body: Body, points: Points, betas: np.ndarray, part: np.ndarray, cloud
 
 
 def _explained(found: Found, count: int) -> float:
-    """m a point and a place, both ways."""
+    """M a point and a place, both ways."""
     matched = found.match >= 0
     off = float(np.nansum(found.residual))
     over = _REACH_M * (count - int(matched.sum())) + _ABSENT * _REACH_M * int((~matched).sum())
@@ -162,8 +172,3 @@ def only(seen: Seen, count: int) -> np.ndarray:
     match = np.full(count, -1)
     match[seen.part] = seen.found.match
     return match
-
-
-def with_cost(seen: Seen, cost: float) -> Seen:
-    """The same at another cost."""
-    return replace(seen, cost=cost)
