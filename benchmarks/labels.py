@@ -4,9 +4,9 @@
 
 DATA holds ``squat_video``, ``subject4``, ``fullbody`` and ``gait``. The sets are learnt by names (no video) from
 ``squats1.trc`` and from one walk of ``gait``; both are applied to other trials: of the person, and of other people. Ten
-breaks, ten exchanges of neighbours within 0.3 m and ghosts (2 % of the samples, 30 to 150 mm beside a marker) are put in
-with a seed. Names are taken off and trajectories shuffled; they are there to judge by. Computed points of the gait files,
-which are no names of the set, are left out. Prints a Markdown table.
+breaks, ten exchanges of neighbours within 0.3 m and ghosts (2 % of the samples, 30 to 150 mm beside a marker) are put
+in with a seed. Names are taken off and trajectories shuffled; they are there to judge by. Computed points of the gait
+files, which are no names of the set, are left out. Prints a Markdown table.
 """
 
 from __future__ import annotations
@@ -200,7 +200,8 @@ def main() -> int:
     parser.add_argument("--only", default="person,people,parts,shipped,sound")
     options = parser.parse_args()
     print(
-        "| trial | taken for the same person | right % | wrong % | certain % | of these right % | breaks | exchanges | moved | CPU s |"
+        "| trial | taken for the same person | right % | wrong % | certain % | of these right % | breaks "
+        "| exchanges | moved | CPU s |"
     )
     print("|---|---|---|---|---|---|---|---|---|---|")
     try:

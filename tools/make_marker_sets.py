@@ -131,8 +131,8 @@ def main() -> None:
         ),
         "ior-cast": (
             {"CV7": "c7", "TV2": "t2", "SJN": "clav", "SXS": "strn", "MAI": "mai", **both(IOR, "L_{}", "R_{}")},
-            "Istituto Ortopedico Rizzoli and CAST. Cappozzo et al. (1995), Clin Biomech 10:171; Leardini et al. (2007), "
-            "Gait Posture 26:560; names after van Sint Jan (2007), Color Atlas of Skeletal Landmark Definitions",
+            "Istituto Ortopedico Rizzoli and CAST. Cappozzo et al. (1995), Clin Biomech 10:171; Leardini et al. "
+            "(2007), Gait Posture 26:560; names after van Sint Jan (2007), Color Atlas of Skeletal Landmark Definitions",
         ),
         "rajagopal": (
             {"C7": "c7", "CLAV": "clav", **both(RAJAGOPAL)},
@@ -144,8 +144,8 @@ def main() -> None:
                 **both({name: key for name, key in OPENCAP_LEG.items() if not name.isupper()}, "L_{}", "r_{}"),
                 **both(OPENCAP_ARM, "L_{}", "R_{}"),
             },
-            "The anatomical markers of the laboratory validation of Uhlrich et al. (2023), PLoS Comput Biol 19:e1011462, "
-            "which are those of Rajagopal et al. (2016)",
+            "The anatomical markers of the laboratory validation of Uhlrich et al. (2023), PLoS Comput Biol "
+            "19:e1011462, which are those of Rajagopal et al. (2016)",
         ),
     }  # fmt: skip
     places = _places()

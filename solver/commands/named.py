@@ -15,9 +15,10 @@ from markerscope.solver.core.rotations import log_so3
 from markerscope.solver.io.export_smpl import write_smpl_npz
 from markerscope.solver.markerset.request import LabelRequest
 from markerscope.solver.pipeline.session import session_folder
+from markerscope.solver.report.outputs import NAMED_MARKERS
 
-NAMED, POSES = "named_markers", "marker_set_poses.npz"
-"""Written beside the results: the trajectories in order, and the poses that they led to."""
+POSES = "marker_set_poses.npz"
+"""Written beside the results: the poses that the named trajectories led to."""
 
 
 def named_first(request: SolveRequest, progress: Progress = silent) -> tuple[SolveRequest, tuple[str, ...]]:
@@ -37,7 +38,7 @@ def named_first(request: SolveRequest, progress: Progress = silent) -> tuple[Sol
         raise InputError("no folder for the results was named", remedy="add --out DIR")
     assert request.marker_set is not None
     is_c3d = request.markers.suffix.lower() == ".c3d"
-    out = request.out / f"{NAMED}{'.c3d' if is_c3d else '.trc'}"
+    out = request.out / f"{NAMED_MARKERS}{'.c3d' if is_c3d else '.trc'}"
     outcome, markers, found = label_into(
         LabelRequest(
             request.markers, out, request.marker_set, request.up, request.units, request.subject, request.marker_rate

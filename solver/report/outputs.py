@@ -62,6 +62,8 @@ FORMATS = {
 """The files of each format; a camera and filled points are not always there."""
 STANDARD = tuple(name for name in FORMATS if name != "angles_long")
 """What a solve writes."""
+NAMED_MARKERS = "named_markers"
+"""The trajectories as a marker set named them, where a solve began with that; ending as the marker file's."""
 _STAMP = "outputs.json"
 
 
@@ -156,6 +158,8 @@ def _write(
     if body_file is not None and body_file.digest and file_digest(body_file.path) != body_file.digest:
         raise changed(body_file.path)
     named = labelled(graph[CLEAN].decided, motion)
+    if named_by_set(session):
+        named = replace(named, labels=markers.labels)
     not_kept: tuple[str, ...] = ()
     if "angles" in formats or "angles_long" in formats:  # the long form, too, has its convention beside it
         write_angles(folder, angles, about, evidence(angles.convention, motion.marker_joint))
@@ -180,6 +184,16 @@ def _write(
     if "report" in formats:
         report_of(folder / "report.html", session, graph, named, about, pictures)
     return not_kept
+
+
+def named_by_set(session: Session) -> bool:
+    """Whether the markers were named by a marker set before the solve, so that their names are to stay."""
+    file = session.inputs.get("marker_file")
+    return (
+        file is not None
+        and file.path.stem == NAMED_MARKERS
+        and file.path.with_name(f"{NAMED_MARKERS}.labels.json").is_file()
+    )
 
 
 def _original(session: Session) -> Original | None:
