@@ -329,7 +329,7 @@ def test_version_and_help(capsys) -> None:
 def test_the_manual_describes_exactly_the_options_there_are(capsys) -> None:
     manual = (Path(__file__).parents[1] / "docs" / "command-line.md").read_text(encoding="utf-8")
     options = set()
-    for words in ([], *([command] for command in COMMANDS)):
+    for words in ([], *([command] for command in COMMANDS), ["markerset", "learn"]):
         main([*words, "--help"])
         options |= set(re.findall(r"--[a-z][a-z-]+", capsys.readouterr().out))
     assert options == set(re.findall(r"(?<!\w)--[a-z][a-z-]+", manual))

@@ -132,7 +132,8 @@ def main() -> None:
         "ior-cast": (
             {"CV7": "c7", "TV2": "t2", "SJN": "clav", "SXS": "strn", "MAI": "mai", **both(IOR, "L_{}", "R_{}")},
             "Istituto Ortopedico Rizzoli and CAST. Cappozzo et al. (1995), Clin Biomech 10:171; Leardini et al. "
-            "(2007), Gait Posture 26:560; names after van Sint Jan (2007), Color Atlas of Skeletal Landmark Definitions",
+            "(2007), Gait Posture 26:560; names after van Sint Jan (2007), Color Atlas of Skeletal Landmark "
+            "Definitions",
         ),
         "rajagopal": (
             {"C7": "c7", "CLAV": "clav", **both(RAJAGOPAL)},

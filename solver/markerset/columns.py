@@ -119,7 +119,7 @@ def in_order(markers: Markers, labelled: Labelled) -> Ordered:
             names.append(markers.labels[column])
         put(run, spare, what)
     labels = _labels(names[:width], owner, labelled.names)
-    was = markers.present.any(axis=0)
+    was = np.atleast_1d(present.any(axis=0))
     emptied = tuple(int(c) for c in range(count) if was[c] and not busy[:, c].any())
     ordered = replace(
         markers, positions=out[:, :width], labels=labels, filled=None if filled is None else filled[:, :width]
