@@ -160,7 +160,7 @@ def _relaxed(
 
 def _off(seen: list[Seen]) -> float:
     """m, what a matched marker is off in the better half of the frames."""
-    return float(np.median([one.cost for one in seen[: max(1, len(seen) // 2)]]))
+    return float(np.median([one.found.cost for one in seen[: max(1, len(seen) // 2)]]))
 
 
 class _Work:
