@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from markerscope.app.cli.main import main
 from markerscope.solver.body.bones import load_body
 from markerscope.solver.body.model import Body
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.markers import Markers
+from markerscope.solver.core.request import SolveRequest
 from markerscope.solver.core.rotations import exp_so3
 from markerscope.solver.core.skeleton import INDEX
 from markerscope.solver.fit import anatomical
 from markerscope.solver.fit.kinematics import Pose
+from markerscope.solver.io import load_markers
+from markerscope.solver.io.export_trc import write_trc
 from markerscope.solver.markerset.columns import contradictions, in_order
 from markerscope.solver.markerset.held import where
 from markerscope.solver.markerset.label import Labelled, label
@@ -166,12 +171,50 @@ def test_nobody_is_refused(trial: Trial) -> None:
         label(trial.body, trial.marker_set, lost)
 
 
+def test_the_command_writes_the_file_and_what_it_did(
+    trial: Trial, named: Labelled, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, out = tmp_path / "in.trc", tmp_path / "out.c3d"
+    write_trc(source, trial.markers)
+    monkeypatch.setattr("markerscope.solver.commands.label.label", lambda *_: named)
+    assert main(["label", str(source), "--marker-set", "rajagopal", "--out", str(out), "--up", "y", "--json"]) == 0
+    said = capsys.readouterr().out
+    about = json.loads(said.splitlines()[-1])
+    assert "Joined: " in said and said.count("Exchanged back: ") == 2
+    assert about["samples"]["unlabelled"] == 8 and about["not_found"] == []
+    back = load_markers(out)
+    assert set(trial.marker_set.names) <= set(back.labels)
+    rows = (tmp_path / "out.labels.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[0].startswith("trajectory,first_frame") and len(rows) == 1 + len(about["stretches"])
+    assert json.loads((tmp_path / "out.labels.json").read_text(encoding="utf-8"))["samples"] == about["samples"]
+    assert main(["label", str(source), "--marker-set", "rajagopal", "--out", str(source)]) == 2
+    assert "would be overwritten" in capsys.readouterr().err
+
+
+def test_a_solve_begins_with_the_names(
+    trial: Trial, named: Labelled, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from markerscope.solver.commands.named import named_first
+
+    source = tmp_path / "in.trc"
+    write_trc(source, trial.markers)
+    monkeypatch.setattr("markerscope.solver.commands.label.label", lambda *_: named)
+    request, said = named_first(SolveRequest(source, out=tmp_path / "out", marker_set="rajagopal", up="y"))
+    assert request.marker_set is None and request.markers == tmp_path / "out" / "named_markers.trc"
+    assert set(trial.marker_set.names) <= set(load_markers(request.markers, up="y").labels)
+    assert request.prior is not None and "no video" in said[-1]
+    with np.load(request.prior) as poses:
+        assert np.allclose(exp_so3(poses["poses"].reshape(-1, 24, 3)), named.pose.rotations, atol=1e-6)
+    video = tmp_path / "v.mp4"
+    request, _ = named_first(SolveRequest(source, out=tmp_path / "out2", marker_set="rajagopal", up="y", video=video))
+    assert request.prior is None and request.video == video
+
+
 SQUAT = Path(__file__).parents[3] / "shared" / "data" / "fullbody" / "labval_walk.trc"
 
 
 @pytest.mark.skipif(not SQUAT.is_file(), reason="the real recordings are not part of this repository")
 def test_a_real_walk_learnt_by_its_names_is_labelled_again() -> None:
-    from markerscope.solver.io import load_markers
     from markerscope.solver.markerset.by_names import pose_by_names
 
     body = load_body()
