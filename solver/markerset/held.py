@@ -14,7 +14,8 @@ from markerscope.solver.fit.labelled.every_frame import every_frame
 from markerscope.solver.fit.labelled.solve import NO_VIDEO, observed
 from markerscope.solver.fit.normal import NormalEquations, diagonal_blocks
 from markerscope.solver.fit.problem import Problem
-from markerscope.solver.fit.state import Camera, Energies, Observations, State, Surface, Weights
+from markerscope.solver.fit.state import Camera, State, Surface, Weights
+from markerscope.solver.fit.terms.term import Estimate
 
 _JOINT_DEG, _ROOT_DEG = 30.0, 60.0
 _ANATOMICAL = 0.1
@@ -22,46 +23,39 @@ _STEPS = ((0.06, 0.30, False, 6), (0.03, 0.12, False, 6), (0.02, 0.08, True, 6))
 """m, spread and kernel of the markers; whether places are free; how often."""
 
 
-class HeldProblem(Problem):
-    """Beside everything else, a marker may be away from its place only so far, in any direction.
-
-    Parameters
-    ----------
-    anchors : (U) where each marker is said to sit
-    spread : (U,) m
-    """
-
-    def __init__(self, body: Body, seen: Observations, anchors: Points, spread: np.ndarray) -> None:
-        super().__init__(body, seen, _no_points(body))
-        self.anchors, self.spread = anchors, spread
-
-    def energies(self, state: State, weights: Weights, surface: Surface) -> Energies:
-        """What the state costs, per frame."""
-        found = super().energies(state, weights, surface)
-        away = (state.placement.rest - self.anchors.rest) / self.spread[:, None]
-        return replace(found, placement=found.placement + float((away**2).sum()) / len(self.target))
-
-    def _add_shared(self, sums: NormalEquations, state: State, surface: Surface, weights: Weights) -> None:
-        super()._add_shared(sums, state, surface, weights)
-        information = self.spread**-2
-        own = information[:, None, None] * np.eye(3)
-        diagonal_blocks(sums.h_ss[None, self.placement_at, self.placement_at])[:, 0] += own
-        away = state.placement.rest - self.anchors.rest
-        sums.g_s[self.placement_at] += (information[:, None] * away).ravel()
-
-
 @dataclass(frozen=True, eq=False)
-class NamedFit:
-    """A body on named markers.
+class Held:
+    """The term of the energy by which a marker is away from its place only so far, in any direction; once and not in
+    every frame.
 
     Attributes
     ----------
-    pose : of all frames that were fitted
-    placement : (U) where the markers sit, as far as the trial moved them
+    places : (U) where each marker is said to sit
+    spread : (U,) m
     """
 
-    pose: Pose
-    placement: Points
+    places: Points
+    spread: np.ndarray
+    name: str = "held"
+
+    def of_frames(self, frames: np.ndarray | slice) -> Held:
+        """See ``Evidence``."""
+        return self
+
+    def energy(self, at: Estimate) -> float:
+        """See ``Term``."""
+        return float(((self._away(at) / self.spread[:, None]) ** 2).sum()) / at.frames
+
+    def add_to(self, sums: NormalEquations, at: Estimate) -> None:
+        """See ``Term``."""
+        placement, information = at.unknowns.placement, self.spread**-2
+        own = information[:, None, None] * np.eye(3)
+        diagonal_blocks(sums.h_ss[None, placement, placement])[:, 0] += own
+        sums.g_s[placement] += (information[:, None] * self._away(at)).ravel()
+
+    def _away(self, at: Estimate) -> np.ndarray:
+        """(U, 3) m."""
+        return np.asarray(at.state.placement.rest - self.places.rest)
 
 
 def weights_of() -> Weights:
@@ -93,8 +87,8 @@ def reshape(
     named : (K, U, 3) m, NaN = lost
     start : poses of the K frames
     """
-    seen = replace(observed(named, start), tracked=np.ones(len(named), bool))
-    problem = HeldProblem(body, seen, anchors, spread)
+    seen = replace(observed(named, start), tracked=np.ones(len(named), bool), further=(Held(anchors, spread),))
+    problem = Problem(body, seen, Points.none(body.shape_count))
     state = State(start, anchors, Camera(np.eye(3), np.zeros(3), np.zeros(3), 1.0))
     surface = _no_surface(anchors)
     for marker, kernel, placed, steps in _STEPS:
@@ -147,10 +141,6 @@ def interpolated(pose: Pose, at: np.ndarray, wanted: np.ndarray) -> Pose:
 def where(body: Body, placement: Points, pose: Pose) -> np.ndarray:
     """(F, U, 3) m, where the body has its markers."""
     return place_points(placement, forward(body, pose), pose.betas)
-
-
-def _no_points(body: Body) -> Points:
-    return Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
 
 
 def _no_surface(points: Points) -> Surface:

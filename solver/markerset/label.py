@@ -23,7 +23,7 @@ _SAME_M = 0.010
 _GATES_M = (0.20, 0.15, 0.12, 0.10)
 _WIDE_M = 0.30
 _SAME_GATE_M = 0.06
-_FOLLOWED_M = (0.045, 0.04, 0.035)
+_FOLLOWED_M = (0.10, 0.06, 0.045, 0.04)
 _FOLLOWED_OTHER_M = (0.10, 0.10, 0.09, 0.08)
 _HARDLY = 0.95
 """What a sample without a name costs while the person's shape is not known yet, so that all find one."""

@@ -22,8 +22,8 @@ _WHOLE_SHARE = 0.8
 _PARTS_KEPT = 10
 _MOST_OVER = 1.5
 _REACH_M = 0.04
-_CLEAR_M, _CLEAR, _ENOUGH_CLEAR = 0.008, 1.5, 4
-"""m, times the next different answer, frames: so sure, no more are looked at."""
+_MANY, _CLEAR_M, _CLEAR, _ENOUGH_CLEAR = 30, 0.008, 1.5, 4
+"""Markers, m, times the next different answer, frames: so sure, no more are looked at. Few markers hold loosely."""
 _ABSENT = 0.35
 """What a place without a point costs, beside a point without a place."""
 
@@ -73,7 +73,10 @@ def search(
         progress(i / len(frames), "looking for the person")
         tries = [_seen(body, points, betas, part, positions[frame], int(frame)) for part in parts]
         seen.append(min(tries, key=lambda one: one.cost))
-        if sum(one.cost < _CLEAR_M and one.found.next_cost > _CLEAR * one.cost for one in seen) >= _ENOUGH_CLEAR:
+        if (
+            len(bones) >= _MANY
+            and sum(one.cost < _CLEAR_M and one.found.next_cost > _CLEAR * one.cost for one in seen) >= _ENOUGH_CLEAR
+        ):
             break
     return sorted(seen, key=lambda one: one.cost)
 
