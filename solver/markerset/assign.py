@@ -53,8 +53,7 @@ def pieces_of(fragments: Fragments, cost: np.ndarray, nobody: float = NOBODY) ->
     """
     piece = np.zeros(len(fragments), int)
     number = -1
-    for column in np.unique(fragments.column):
-        own = np.flatnonzero(fragments.column == column)
+    for own in _sequences(fragments):
         path = _path(cost[own], fragments.length[own], fragments.cut[own], nobody)
         for i, f in enumerate(own):
             number += i == 0 or path[i] != path[i - 1]
@@ -69,6 +68,18 @@ def pieces_of(fragments: Fragments, cost: np.ndarray, nobody: float = NOBODY) ->
     total = np.zeros((count, cost.shape[1]))
     np.add.at(total, piece, cost * fragments.length[:, None])
     return Pieces(piece, first, last, columns, samples, total / np.maximum(samples, 1)[:, None])
+
+
+def _sequences(fragments: Fragments) -> list[np.ndarray]:
+    """Fragments that go on from each other, in order of time; each is in one of them."""
+    after = {int(b): f for f, b in enumerate(fragments.before) if b >= 0}
+    found = []
+    for f in np.flatnonzero(fragments.before < 0):
+        own = [int(f)]
+        while own[-1] in after:
+            own.append(after[own[-1]])
+        found.append(np.array(own))
+    return found
 
 
 def _path(cost: np.ndarray, length: np.ndarray, cut: np.ndarray, nobody: float) -> np.ndarray:

@@ -13,6 +13,8 @@ _UNUSUAL = 6.0
 _NEAR_M = 0.030
 """Markers that come nearer than this may be exchanged without a jump that stands out."""
 _USUAL_HZ = 100.0
+_LINK_M, _LINK_CLEAR = 0.010, 0.4
+"""m beside the way, and share of the next best, within which a fragment goes on from one that ended a frame before."""
 HARD, SOFT, START = 2, 1, 3
 
 
@@ -32,6 +34,7 @@ class Fragments:
     first: np.ndarray
     last: np.ndarray
     cut: np.ndarray
+    before: np.ndarray
 
     def __len__(self) -> int:
         return len(self.column)
@@ -70,7 +73,37 @@ def cut_up(positions: np.ndarray, rate: float) -> Fragments:
         ends = np.append(starts[1:], len(seen)) - 1
         rows += [(n, seen[a], seen[b], kinds[a]) for a, b in zip(starts, ends)]
     table = np.array(rows, int).reshape(-1, 4)
-    return Fragments(*table.T)
+    column, first, last, cut = table.T
+    before, cut = _linked(positions, column, first, last, cut.copy(), rate)
+    return Fragments(column, first, last, cut, before)
+
+
+def _linked(
+    positions: np.ndarray, column: np.ndarray, first: np.ndarray, last: np.ndarray, cut: np.ndarray, rate: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(F,) what each fragment goes on from, and (F,) the cuts, ``SOFT`` where one goes on from another's end without a
+    gap, the only one of either to do so.
+    """
+    before = np.full(len(column), -1)
+    own = np.flatnonzero(column[1:] == column[:-1]) + 1
+    before[own] = own - 1
+    scale = max(1.0, _USUAL_HZ / rate)
+    for frame in np.unique(first[cut != SOFT]):
+        begun = np.flatnonzero((first == frame) & (cut != SOFT) & (last > frame))
+        ended = np.flatnonzero((last == frame - 1) & (last > first))
+        if not len(begun) or not len(ended):
+            continue
+        step = positions[frame - 1, column[ended]] - positions[frame - 2, column[ended]]
+        ahead = positions[frame - 1, column[ended]] + step
+        off = np.linalg.norm(positions[frame, column[begun]][:, None] - ahead, axis=2)
+        for i, f in enumerate(begun):
+            k = int(off[i].argmin())
+            others = np.concatenate([np.delete(off[i], k), np.delete(off[:, k], i), [np.inf]])
+            if off[i, k] < _LINK_M * scale and off[i, k] < _LINK_CLEAR * others.min():
+                # whoever followed that end in its own trajectory follows it no more
+                before[before == ended[k]] = -1
+                before[f], cut[f] = int(ended[k]), SOFT
+    return before, cut
 
 
 def _jumps(positions: np.ndarray, present: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
