@@ -56,22 +56,41 @@ class Found:
 
 
 def find(body: Body, known: KnownBody, points: np.ndarray) -> Found:
-    """The known person among unlabelled points.
+    """The known person among unlabelled points: the cheapest of the answers.
 
     Parameters
     ----------
     body : the one that ``known`` was fitted with
     points : (P, 3) m, internal lab frame, z up; some of the person's markers and whatever else was seen, NaN = lost
     """
+    return answers(body, known, points)[0]
+
+
+def answers(body: Body, known: KnownBody, points: np.ndarray) -> tuple[Found, ...]:
+    """The different ways to see the known person among unlabelled points, the cheapest first.
+
+    Parameters
+    ----------
+    body, known, points : as of ``find``
+    """
     seen = np.flatnonzero(np.isfinite(points).all(axis=1))
     starts = [start for _, start in promising(body, known, points[seen])]
-    answers = sorted((_bent(body, known, points[seen], start) for start in starts), key=lambda found: found.cost)
-    best = answers[0]
-    links = [forward(body, Pose(a.rotations[None], a.trans[None], known.betas)) for a in answers]
+    ended = sorted(_bent(body, known, points[seen], starts), key=lambda found: found.cost)
+    links = [forward(body, Pose(a.rotations[None], a.trans[None], known.betas)) for a in ended]
     places = [place_points(known.placement, link, known.betas)[0] for link in links]
-    others = [a.cost for a, p in zip(answers, places) if np.linalg.norm(p - places[0], axis=1).mean() > _SAME_M]
-    match = np.where(best.match >= 0, seen[np.clip(best.match, 0, None)], -1)
-    return replace(best, match=match, next_cost=min(others, default=float("inf")))
+    chosen: list[int] = []
+    for i, place in enumerate(places):
+        if all(np.linalg.norm(place - places[c], axis=1).mean() > _SAME_M for c in chosen):
+            chosen.append(i)
+    costs = [ended[c].cost for c in chosen]
+    return tuple(
+        replace(
+            ended[c],
+            match=np.where(ended[c].match >= 0, seen[np.clip(ended[c].match, 0, None)], -1),
+            next_cost=min((cost for k, cost in enumerate(costs) if k != i), default=float("inf")),
+        )
+        for i, c in enumerate(chosen)
+    )
 
 
 def promising(body: Body, known: KnownBody, points: np.ndarray) -> list[tuple[float, Pose]]:
@@ -133,8 +152,8 @@ def promising(body: Body, known: KnownBody, points: np.ndarray) -> list[tuple[fl
     return starts
 
 
-def _bent(body: Body, known: KnownBody, points: np.ndarray, start: Pose) -> Found:
-    """Matched one to one and bent, in turns, the reach narrowing."""
+def _bent(body: Body, known: KnownBody, points: np.ndarray, starts: list[Pose]) -> list[Found]:
+    """Each start matched one to one and bent, in turns, the reach narrowing; all at once, as if each were a frame."""
     held = replace(
         NO_VIDEO, free_shape=False, free_placement=False, prior_deg=_JOINT_DEG, root_deg=_ROOT_DEG, anatomical=0.1
     )
@@ -142,11 +161,13 @@ def _bent(body: Body, known: KnownBody, points: np.ndarray, start: Pose) -> Foun
     count = len(known.placement.rest)
     surface = Surface(np.zeros((count, 3)), np.tile([0.0, 0, 1], (count, 1)))
     none = Points.none(body.shape_count)
-    pose = start
+    pose = Pose(
+        np.concatenate([s.rotations for s in starts]), np.concatenate([s.trans for s in starts]), known.betas
+    )
     for reach in _REACH_M:
         match = _matched(_placed(body, known, pose), points, reach)
-        target = np.where((match >= 0)[:, None], points[np.clip(match, 0, None)], np.nan)
-        seen = replace(observed(target[None], pose), tracked=np.ones(1, bool))
+        target = np.where((match >= 0)[..., None], points[np.clip(match, 0, None)], np.nan)
+        seen = replace(observed(target, pose), tracked=np.ones(len(starts), bool))
         problem, state = Problem(body, seen, none), State(pose, known.placement, camera)
         weights = replace(held, marker=reach / 4, marker_kernel=2 * reach)
         for _ in range(_STEPS_EACH):
@@ -154,21 +175,26 @@ def _bent(body: Body, known: KnownBody, points: np.ndarray, start: Pose) -> Foun
         pose = state.pose
     places = _placed(body, known, pose)
     match = _matched(places, points, _REACH_M[-1])
-    residual = np.where(match >= 0, np.linalg.norm(places - points[np.clip(match, 0, None)], axis=1), np.nan)
-    cost = float(np.where(match >= 0, residual, _REACH_M[-1]).mean())
-    return Found(pose.rotations[0], pose.trans[0], match, residual, cost, float("inf"))
+    gap = np.linalg.norm(places - points[np.clip(match, 0, None)], axis=2)
+    residual = np.where(match >= 0, gap, np.nan)
+    cost = np.where(match >= 0, residual, _REACH_M[-1]).mean(axis=1)
+    return [
+        Found(pose.rotations[s], pose.trans[s], match[s], residual[s], float(cost[s]), float("inf"))
+        for s in range(len(starts))
+    ]
 
 
 def _placed(body: Body, known: KnownBody, pose: Pose) -> np.ndarray:
-    """(U, 3) m, where the person's markers are in a pose."""
-    return place_points(known.placement, forward(body, pose), pose.betas)[0]
+    """(N, U, 3) m, where the person's markers are in each pose."""
+    return place_points(known.placement, forward(body, pose), pose.betas)
 
 
 def _matched(places: np.ndarray, points: np.ndarray, reach: float) -> np.ndarray:
-    """(U,) the point of each place, one to one with the least sum of squares within reach; -1 for none."""
-    square = ((places[:, None] - points) ** 2).sum(axis=2)
-    rows, columns = linear_sum_assignment(np.minimum(square, reach**2))
-    match = np.full(len(places), -1)
-    near = square[rows, columns] < reach**2
-    match[rows[near]] = columns[near]
+    """(N, U) the point of each place, one to one with the least sum of squares within reach; -1 for none."""
+    square = ((places[:, :, None] - points) ** 2).sum(axis=3)
+    match = np.full(places.shape[:2], -1)
+    for s, own in enumerate(square):
+        rows, columns = linear_sum_assignment(np.minimum(own, reach**2))
+        near = own[rows, columns] < reach**2
+        match[s, rows[near]] = columns[near]
     return match
