@@ -14,7 +14,7 @@ from markerscope.solver.core.errors import InputError
 
 Up = Literal["x", "y", "z"]
 Units = Literal["m", "cm", "mm"]
-Method = Literal["bundle", "paper", "neural"]
+Method = Literal["bundle", "paper", "neural", "known"]
 RECORDED = "recorded"
 """What ``--neutral`` takes for the convention's own zero."""
 _SPAN = re.compile(r"[-+.\deE]*:[-+.\deE]*")

@@ -12,10 +12,11 @@ from markerscope.solver.core.request import Method
 from markerscope.solver.pipeline.session import Session
 from markerscope.solver.pipeline.stage import Stage
 from markerscope.solver.pipeline.stages import GRAPH
+from markerscope.solver.pipeline.stages_known import GRAPH_KNOWN
 from markerscope.solver.pipeline.stages_neural import GRAPH_NEURAL
 from markerscope.solver.pipeline.stages_paper import GRAPH_PAPER
 
-GRAPHS: dict[Method, tuple[Stage, ...]] = {"bundle": GRAPH, "paper": GRAPH_PAPER, "neural": GRAPH_NEURAL}
+GRAPHS: dict[Method, tuple[Stage, ...]] = {"bundle": GRAPH, "paper": GRAPH_PAPER, "neural": GRAPH_NEURAL, "known": GRAPH_KNOWN}
 
 
 def graph_of(session: Session) -> tuple[Stage, ...]:

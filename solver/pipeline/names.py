@@ -10,6 +10,7 @@ from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.prior import PosePrior
 from markerscope.solver.fit.doubts.rules import Verdict
 from markerscope.solver.fit.known.neutral import Neutral
+from markerscope.solver.fit.known.track import Tracked
 from markerscope.solver.fit.published.results import PaperLocalization, PaperSolve
 from markerscope.solver.fit.results import FittedMotion, Localization, Orientation
 from markerscope.solver.fit.surface import SurfaceDistance
@@ -30,6 +31,8 @@ NEUTRAL = StageName[Neutral]("neutral")
 ANGLES = StageName[JointAngles]("angles")
 SURFACE = StageName[SurfaceDistance]("surface")
 CHECK = StageName[Verdict]("check")
+KNOWN = StageName[Tracked]("known")
+"""Of a known person alone."""
 NETWORK = StageName[NetworkPoses]("network")
 """Of the method with a network alone."""
 SOLVE = StageName[PaperSolve]("solve")

@@ -24,7 +24,7 @@ from markerscope.solver.pipeline.inputs import LandmarkSettings, MarkerSettings,
 from markerscope.solver.pipeline.stage import NoSettings, Stage
 from markerscope.solver.sync.offset import Sync
 
-SOURCES = ("marker_file", "video_file", "prior_file", "camera_file", "body_file", "weights_file", "neutral_file")
+SOURCES = ("marker_file", "video_file", "prior_file", "camera_file", "body_file", "weights_file", "neutral_file", "known_file")
 """The files a session is made from, by the names ``session.toml`` has for them."""
 
 
@@ -50,7 +50,8 @@ def said_segmentation(found: Segmentation) -> str:
     return f"{found.count} groups of markers that move together"
 
 
-def _said_localization(found: Localization) -> str:
+def said_localization(found: Localization) -> str:
+    """How many ways there are."""
     return f"{len(found.start)} ways to put the markers on the body"
 
 
@@ -147,7 +148,7 @@ GRAPH = (
         (*FITTED_TO, "segment", "camera_file"),
         fitting.place_markers,
         Localization,
-        _said_localization,
+        said_localization,
         cost=2,
         shipped=BODY,
     ),
