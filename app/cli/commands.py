@@ -36,8 +36,9 @@ from markerscope.solver.neural.request import TrainRequest
 
 def _solve(request: SolveRequest, progress: Progress) -> SolveOutcome:
     from markerscope.solver.commands import solve_session
+    from markerscope.solver.subject import is_subject, solve_subject
 
-    return solve_session(request, progress)
+    return solve_subject(request, progress) if is_subject(request.markers) else solve_session(request, progress)
 
 
 def _evaluate(request: EvaluateRequest, progress: Progress) -> Outcome:

@@ -170,7 +170,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _solve_options(solve: argparse.ArgumentParser) -> None:
-    solve.add_argument("markers", type=Path, metavar="MARKERS|SESSION", help="C3D, TRC, CSV or TSV file, or a session")
+    solve.add_argument("markers", type=Path, metavar="MARKERS|SESSION|SUBJECT", help="C3D, TRC, CSV or TSV file, a session, or a subject's TOML file")
     solve.add_argument("--out", type=Path, metavar="DIR", help="folder for the results (a session has its own)")
 
     inputs = solve.add_argument_group("beside the markers")
@@ -178,6 +178,13 @@ def _solve_options(solve: argparse.ArgumentParser) -> None:
     inputs.add_argument("--prior", type=Path, metavar="FILE", help="poses by 4D-Humans, WHAM, GVHMR, TRAM; AMASS npz")
     inputs.add_argument("--camera", type=Path, metavar="RESULT", help="take the camera from another trial's result")
     inputs.add_argument("--marker-set", metavar="NAME|FILE", help=f"name the markers first: {SET_HELP}")
+    inputs.add_argument("--known", type=Path, metavar="FILE", help="a person known from other trials (person.npz)")
+    inputs.add_argument(
+        "--markers-moved",
+        action="store_true",
+        default=None,
+        help="with --known and no video: markers were put on anew near the same places",
+    )
     inputs.add_argument("--body", type=Path, metavar="FILE", help="an SMPL-layout model instead of the embedded body")
 
     reading = solve.add_argument_group("reading the markers (by default as the file says, else guessed and reported)")

@@ -40,6 +40,7 @@ INPUTS = {
     "body_file": "body",
     "weights_file": "network's weights",
     "neutral_file": "static trial for the neutral pose",
+    "known_file": "person known from other trials",
 }
 
 

@@ -38,7 +38,7 @@ from markerscope.solver.pipeline.session_file import FILE_NAME, edited_by_hand, 
 from markerscope.solver.pipeline.settings import UNSET, overlay, without
 from markerscope.solver.pipeline.source import contents
 from markerscope.solver.pipeline.stage import GraphRun, OnEvent, ignore, run_graph, stage_keys
-from markerscope.solver.pipeline.stages import SOURCES
+from markerscope.solver.pipeline.stages import POSED_BY, SOURCES
 from markerscope.solver.report.outputs import FILES, SOMETIMES, write_outputs
 
 _WORTH_KEEPING_S = 5.0
@@ -73,9 +73,11 @@ def solve_session(request: SolveRequest, progress: Progress = silent, on_event: 
             f"solve that session itself (markerscope solve {folder}), or choose another folder",
         )
     session = session_of(request)
-    if not {"video_file", "prior_file"} & set(session.inputs):
+    if not POSED_BY & set(session.inputs):
         raise InputError(
-            "there is neither a video nor a pose prior", request.markers, "give one with --video or --prior"
+            "there is neither a video nor a pose prior",
+            request.markers,
+            "give one with --video or --prior, or a person known from another trial with --known",
         )
     with _tidy(session):
         stages = graph_of(session)
@@ -115,7 +117,7 @@ def session_of(request: SolveRequest) -> Session:
         raise InputError("no folder for the results was named", remedy="add --out DIR")
     else:
         session = _with_input(_again(out, request), "marker_file", request.markers)
-    for name in ("video", "prior", "camera", "body", "weights"):
+    for name in ("video", "prior", "camera", "body", "weights", "known"):
         path = getattr(request, name)
         if path is not None:
             session = _with_input(session, f"{name}_file", camera_file(path) if name == "camera" else path)
@@ -195,7 +197,7 @@ def _with_neutral(session: Session, request: SolveRequest) -> Session:
 
 def _with_options(session: Session, request: SolveRequest) -> Session:
     """The request's options over the session's settings, and over its edits: what is said last counts."""
-    session = with_method(session, request.method or session.run.method)
+    session = with_method(session, _method(session, request))
     if request.weights is not None and session.run.method != "neural":
         raise InputError("weights are for --method neural alone", "--weights", "add --method neural, or leave it out")
     settings, edits = dict(session.settings), dict(session.edits)
@@ -211,6 +213,23 @@ def _with_options(session: Session, request: SolveRequest) -> Session:
     )
 
 
+def _method(session: Session, request: SolveRequest) -> Method:
+    """The method asked for; a known person in a trial without a video is found by a method of its own."""
+    if request.method is not None:
+        method = request.method
+    elif "known_file" in session.inputs and not {"video_file", "prior_file"} & set(session.inputs):
+        method = "known"
+    else:
+        method = RunSettings().method if session.run.method == "known" else session.run.method
+    if method == "known" and "known_file" not in session.inputs:
+        raise InputError("no known person is named", "--method known", "add --known person.npz")
+    if request.markers_moved is not None and method != "known":
+        raise InputError(
+            "is for a known person without a video alone", "--markers-moved", "add --known person.npz, or leave it out"
+        )
+    return method
+
+
 def _said(request: SolveRequest) -> dict[str, dict[str, Any]]:
     """The options of a request as tables of settings; what it does not say is not in them."""
     options: dict[str, dict[str, Any]] = {
@@ -221,6 +240,7 @@ def _said(request: SolveRequest) -> dict[str, dict[str, Any]]:
             "rate": request.marker_rate,
         },
         "sync": {"offset": request.offset, "rate_ratio": request.rate_ratio},
+        **({} if request.markers_moved is None else {"orient": {"markers_moved": request.markers_moved}}),
         **({} if request.part_of_cloud is None else {"localize": {"part_of_cloud": request.part_of_cloud}}),
         "angles": {"convention": request.convention},
     }

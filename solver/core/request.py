@@ -50,6 +50,8 @@ class SolveRequest:
     convention : names and signs of the angles
     neutral : what the angles are counted from: a span (start, stop) s of the trial, either may be None, the file of a
         static trial of the same person, or "recorded" for the convention's own zero
+    known : a person known from other trials (person.npz): shape and marker places are taken from there
+    markers_moved : the markers were put on anew since then, near the same places
     landmark_pull : whether markers are drawn to bony landmarks where their layout has earned it
     """
 
@@ -75,6 +77,8 @@ class SolveRequest:
     convention: Convention | None = None
     neutral: tuple[float | None, float | None] | Path | Literal["recorded"] | None = None
     landmark_pull: LandmarkPull | None = None
+    known: Path | None = None
+    markers_moved: bool | None = None
 
     def __post_init__(self) -> None:
         """Refuse values that no data can make sense of."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -249,8 +250,14 @@ def fit(
     time: np.ndarray,
     settings: FitSettings,
     progress: Progress = silent,
+    hold: Callable[[Problem, State, Surface, Weights], tuple[State, Surface]] | None = None,
 ) -> FittedMotion:
-    """The chosen answer carried to every frame."""
+    """The chosen answer carried to every frame.
+
+    Parameters
+    ----------
+    hold : what is known of the person put in the place of what the keyframes say
+    """
     row = chosen_row(ranked, settings)
     chosen = ranked.candidates[row]
     used = in_use(seen, found, ranked)
@@ -264,8 +271,11 @@ def fit(
     drawn = to_landmarks(body, kept, landmarks, found.markers, frames, state, surface, weights, own)
     around = (body, used.at(frames), landmarks)
     searched = search_limbs(*around, drawn.state, drawn.surface, weights, drawn.by, settings.second)
-    pose = every_frame(body, used, landmarks, frames, searched.state, searched.surface, weights, progress)
-    motion = fitted_motion(body, seen, found, ranked, settings, searched.state, pose, time)
+    state, surface = searched.state, searched.surface
+    if hold is not None:
+        state, surface = hold(Problem(*around), state, surface, weights)
+    pose = every_frame(body, used, landmarks, frames, state, surface, weights, progress)
+    motion = fitted_motion(body, seen, found, ranked, settings, state, pose, time)
     return replace(motion, pull=drawn.pull, second=searched.others)
 
 

@@ -103,14 +103,18 @@ def fit_every_frame(
     *,
     localize: Localization,
     orient: Orientation,
+    known_file: Path | None,
     **given: Unpack[FittedTo],
 ) -> FittedMotion:
-    """The chosen answer carried to every frame."""
+    """The chosen answer carried to every frame; of a known person, with the shape and the places known of them."""
     from markerscope.solver.fit import method
+    from markerscope.solver.fit.known.hold import held_to
+    from markerscope.solver.fit.known.person_file import read_person
 
     body, seen, points = scene(**given)
     time = given["clean"].markers.time
-    return method.fit(body, seen, points, localize, orient, time, settings, progress)
+    hold = None if known_file is None else held_to(body, read_person(known_file, body))
+    return method.fit(body, seen, points, localize, orient, time, settings, progress, hold)
 
 
 def find_neutral(

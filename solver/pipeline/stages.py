@@ -26,6 +26,8 @@ from markerscope.solver.sync.offset import Sync
 
 SOURCES = ("marker_file", "video_file", "prior_file", "camera_file", "body_file", "weights_file", "neutral_file", "known_file")
 """The files a session is made from, by the names ``session.toml`` has for them."""
+POSED_BY = {"video_file", "prior_file", "known_file"}
+"""Of these a session has at least one: where poses come from."""
 
 
 def _said_markers(markers: Markers) -> str:
@@ -167,7 +169,7 @@ GRAPH = (
         "fit",
         6,
         FitSettings,
-        (*FITTED_TO, "localize", "orient"),
+        (*FITTED_TO, "localize", "orient", "known_file"),
         fitting.fit_every_frame,
         FittedMotion,
         said_fit,

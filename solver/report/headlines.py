@@ -17,7 +17,7 @@ TIE = 1.15
 
 
 def headlines(
-    sync: Sync,
+    sync: Sync | None,
     ranked: Orientation,
     motion: FittedMotion,
     surface: SurfaceDistance,
@@ -28,6 +28,7 @@ def headlines(
 
     Parameters
     ----------
+    sync : None where there was no video to bring onto the markers' clock
     pinned : row of the candidate that was pinned by hand, None where the best was taken
     """
     margin = f"next answer costs {ranked.margin:.2f} times" if np.isfinite(ranked.margin) else "no other answer found"
@@ -39,10 +40,10 @@ def headlines(
         Headline("Confidence", f"{100 * check.confidence:.0f} %", margin),
         Headline("Marker residual", f"{1000 * np.nanmedian(motion.residual):.1f} mm", "median distance from its place"),
         Headline("Marker to skin", f"{1000 * surface.mean:.1f} mm", "mean; a marker's centre stands some 9.5 mm off"),
-        Headline(
-            "Sync offset", f"{sync.offset:+.3f} s", f"added to the video's time; confidence {sync.confidence:.2f}"
-        ),
     ]
+    if sync is not None:
+        note = f"added to the video's time; confidence {sync.confidence:.2f}"
+        rows.append(Headline("Sync offset", f"{sync.offset:+.3f} s", note))
     if np.isfinite(camera.reprojection_px):
         rows.append(
             Headline("Reprojection", f"{camera.reprojection_px:.0f} px", "median distance of the video's landmarks")

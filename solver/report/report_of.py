@@ -44,6 +44,7 @@ _ROLES = {
     "camera_file": "camera",
     "body_file": "body",
     "neutral_file": "neutral pose",
+    "known_file": "known person",
 }
 _LIBRARIES = ("numpy", "scipy", "open3d-cpu", "open3d", "ai-edge-litert", "av")
 
@@ -93,7 +94,7 @@ def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str,
     return ReportData(
         title=marker_file.stem,
         subtitle=f"{part}, {len(motion.time)} frames at {markers.rate:g} Hz{stands_on}",
-        headlines=headlines(graph[SYNC], ranked, motion, graph[SURFACE], graph[CHECK], pinned),
+        headlines=headlines(None if "known" in graph.keys else graph[SYNC], ranked, motion, graph[SURFACE], graph[CHECK], pinned),
         warnings=doubts(graph),
         inputs=inputs,
         groups=_groups(markers, graph[SEGMENT]),
@@ -142,7 +143,7 @@ def _curves(angles: JointAngles) -> tuple[AngleCurve, ...]:
     """One curve per angle, left and right together."""
     columns: dict[str, dict[str, int]] = {}
     for i, name in enumerate(angles.names):
-        title, side = _title_and_side(name, angles.names)
+        title, side = title_and_side(name, angles.names)
         columns.setdefault(title, {})[side] = i
     curves = []
     for title, sides in columns.items():
@@ -154,7 +155,7 @@ def _curves(angles: JointAngles) -> tuple[AngleCurve, ...]:
     return tuple(curves)
 
 
-def _title_and_side(name: str, names: tuple[str, ...]) -> tuple[str, str]:
+def title_and_side(name: str, names: tuple[str, ...]) -> tuple[str, str]:
     """What a column is of, and of which side: conventions put ``_r`` at the end or ``R`` at the start."""
     words = name.replace("_", " ")
     for end, side in (("_r", "right"), ("_l", "left")):

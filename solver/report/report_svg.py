@@ -125,14 +125,19 @@ def affinity_legend(groups: Groups) -> str:
     return f'<img class="legend" alt="" src="{png(bar)}">'
 
 
-def angle_plot(curve: AngleCurve) -> str:
-    """One angle over time; a gap where it is unknown, a grey band where it must not be read."""
+def angle_plot(curve: AngleCurve, limits: tuple[float, float] | None = None) -> str:
+    """One angle over time; a gap where it is unknown, a grey band where it must not be read.
+
+    Parameters
+    ----------
+    limits : of the vertical axis, where several plots share one; None fits the curve
+    """
     width, height, left, bottom, top, right = 360, 170, 38, 22, 8, 8
     known = [v[np.isfinite(v)] for v in curve.sides.values()]
     values = np.concatenate(known) if known else np.zeros(0)
     if not len(values):
         return '<p class="quiet">No frame of this angle is known.</p>'
-    low, high = float(values.min()), float(values.max())
+    low, high = limits or (float(values.min()), float(values.max()))
     pad = max(0.06 * (high - low), 1.0)
     low, high = low - pad, high + pad
     start, end = float(curve.time[0]), float(max(curve.time[-1], curve.time[0] + 1e-6))
