@@ -201,6 +201,7 @@ def run_stages(
         "body_file": given.body,
         "camera_file": None,
         "weights_file": None,
+        "known_file": None,
         **(known or {}),
     }
     seconds: dict[str, float] = {}

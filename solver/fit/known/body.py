@@ -23,12 +23,14 @@ class KnownBody:
     placement : (U) markers on the body at rest
     markers : (U,) index of each among the trial's markers
     poses : (P, 24, 3, 3) parent-relative rotations that the person was seen in, root included
+    off_m : m, how far the markers are from their places on average where the person was seen; NaN where unknown
     """
 
     betas: np.ndarray
     placement: Points
     markers: np.ndarray
     poses: np.ndarray
+    off_m: float = float("nan")
 
 
 def known_body(body: Body, motion: FittedMotion) -> KnownBody:
@@ -53,10 +55,11 @@ def known_body(body: Body, motion: FittedMotion) -> KnownBody:
     normal = np.einsum("fuab,fuac->ubc", turn, turn)
     rest = np.linalg.solve(normal, np.einsum("fuab,fua->ub", turn, gap)[..., None])[..., 0]
     placement = Points(rest - skin.dirs @ motion.betas, skin.dirs, skin.weights)
-    return KnownBody(motion.betas, placement, markers, _spread_out(motion.rotations, markers=motion.marker_joint))
+    off = float(np.nanmean(motion.residual[:, markers])) if np.isfinite(motion.residual[:, markers]).any() else np.nan
+    return KnownBody(motion.betas, placement, markers, spread_out(motion.rotations), off)
 
 
-def _spread_out(rotations: np.ndarray, markers: np.ndarray, count: int = 6) -> np.ndarray:
+def spread_out(rotations: np.ndarray, count: int = 6) -> np.ndarray:
     """Some of the poses, each as unlike those before it as can be (farthest points), root included."""
     some = rotations[:: max(1, len(rotations) // 400)]
     joints = some[:, 1:].reshape(len(some), -1)

@@ -15,7 +15,7 @@ from markerscope.solver.core.rotations import slerp
 from markerscope.solver.fit.bundle import Phase, descend
 from markerscope.solver.fit.kinematics import Points, Pose
 from markerscope.solver.fit.known.body import KnownBody
-from markerscope.solver.fit.known.same import compare
+from markerscope.solver.fit.known.same import Compared, compare, said
 from markerscope.solver.fit.known.track import Tracked, surface_of
 from markerscope.solver.fit.labelled.every_frame import every_frame
 from markerscope.solver.fit.labelled.solve import NO_VIDEO, observed
@@ -124,13 +124,13 @@ def ranked(
     ----------
     seen : all T frames
     """
-    used = replace(seen, markers=seen.markers[:, found.markers])
+    mine = seen.markers[:, found.markers]
     best_place = tracked.tracks[0].place
     candidates: list[Candidate] = []
     for row, track in enumerate(tracked.tracks):
         progress(row / len(tracked.tracks), "refining the answers")
         place = _own(track.place, best_place)[found.markers]
-        some, state, surface = _begun(body, known, used, track.frames, place, track.rotations, track.trans)
+        some, state, surface = _begun(body, known, mine, track.frames, place, track.rotations, track.trans)
         problem = Problem(body, some, _none(body))
         state, surface, trace = descend(problem, state, surface, (_HELD,), WEIGHTS)
         if settings.markers_moved and row == 0:
@@ -143,14 +143,19 @@ def ranked(
     order = sorted(range(1, len(candidates)), key=lambda i: behind[i])
     rows = (first, *(replace(candidates[i], behind=behind[i]) for i in order))
     margin = rows[1].behind if order else float("inf")
-    share = len(set(best_place[best_place >= 0].tolist())) / len(known.placement.rest)
-    best = tracked.tracks[0]
-    some, state, surface = _begun(
-        body, known, used, best.frames, best_place[found.markers], best.rotations, best.trans
-    )
-    judged = compare(body, some, state, surface, WEIGHTS, share, moved=settings.markers_moved)
+    judged = said(comparison(body, known, tracked, seen.markers), known.off_m, moved=settings.markers_moved)
     confidence = min(_sure(margin), judged.cap)
     return Orientation(rows, float(margin), 1 if order else -1, confidence, judged.doubts)
+
+
+def comparison(body: Body, known: KnownBody, tracked: Tracked, markers: np.ndarray) -> Compared:
+    """What holding the person's shape and places costs the trial (T, M, 3) m."""
+    best = tracked.tracks[0]
+    used = np.flatnonzero(best.place >= 0)
+    some, state, surface = _begun(
+        body, known, markers[:, used], best.frames, best.place[used], best.rotations, best.trans
+    )
+    return compare(body, some, state, surface, WEIGHTS, len(set(best.place[used].tolist())) / len(known.placement.rest))
 
 
 def fitted(
@@ -174,7 +179,7 @@ def fitted(
 def _begun(
     body: Body,
     known: KnownBody,
-    used: Observations,
+    markers: np.ndarray,
     frames: np.ndarray,
     place: np.ndarray,
     rotations: np.ndarray,
@@ -182,7 +187,7 @@ def _begun(
 ) -> tuple[Observations, State, Surface]:
     """The known person with the columns (U) at some places, in a track's poses."""
     start = Pose(rotations, trans, known.betas)
-    some = observed(used.markers[frames], start)
+    some = observed(markers[frames], start)
     placement = known.placement.take(place)
     camera = Camera(np.eye(3), np.zeros(3), np.zeros(3), 1.0)
     return some, State(start, placement, camera), surface_of(body, placement, known.betas)

@@ -15,7 +15,7 @@ from markerscope.solver.fit.known.body import KnownBody
 from markerscope.solver.io.atomic import write_bytes_atomic
 
 _FORMAT = "markerscope-person-1"
-_NAMES = ("betas", "rest", "dirs", "weights", "markers", "poses")
+_NAMES = ("betas", "rest", "dirs", "weights", "markers", "poses", "off_m")
 _REMEDY = "give the person.npz that a solve of a subject left"
 
 
@@ -27,7 +27,7 @@ def write_person(path: str | Path, known: KnownBody) -> None:
     InputError : the file system refuses
     """
     at = known.placement
-    arrays = (known.betas, at.rest, at.dirs, at.weights, known.markers, known.poses)
+    arrays = (known.betas, at.rest, at.dirs, at.weights, known.markers, known.poses, np.array(known.off_m))
     content = io.BytesIO()
     np.savez_compressed(content, format=np.array(_FORMAT), **dict(zip(_NAMES, arrays)))
     write_bytes_atomic(path, content.getvalue())
@@ -48,7 +48,7 @@ def read_person(path: str | Path, body: Body) -> KnownBody:
         with np.load(path, allow_pickle=False) as content:
             if str(content["format"]) != _FORMAT:
                 raise InputError("holds no person that this version can read", path, _REMEDY)
-            betas, rest, dirs, weights, markers, poses = (content[name] for name in _NAMES)
+            betas, rest, dirs, weights, markers, poses, off = (content[name] for name in _NAMES)
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise InputError("holds no person", path, _REMEDY) from error
     count, shapes = len(rest), body.shape_count
@@ -56,4 +56,4 @@ def read_person(path: str | Path, body: Body) -> KnownBody:
         raise InputError("was made with another body", path, "solve the subject again with this body")
     if not all(np.isfinite(a).all() for a in (betas, rest, dirs, weights, poses)):
         raise InputError("is damaged: a number in it is not finite", path, _REMEDY)
-    return KnownBody(betas, Points(rest, dirs, weights), markers, poses)
+    return KnownBody(betas, Points(rest, dirs, weights), markers, poses, float(off))
