@@ -154,7 +154,10 @@ def compared(results: dict[str, Any], person: Path) -> dict[str, Any]:
 
 def table(rows: list[dict[str, Any]]) -> str:
     """Means by kind, and how often another person was noticed."""
-    lines = ["| | trials | 12-joint MPJPE (mm) | hips (mm) | markers on the right bone | CPU s |", "|---|---|---|---|---|---|"]
+    lines = [
+        "| | trials | 12-joint MPJPE (mm) | hips (mm) | markers on the right bone | CPU s |",
+        "|---|---|---|---|---|---|",
+    ]
     for kind in ("first", "video", "known", "same person", "markers moved", "another person"):
         own = [row for row in rows if row["kind"] == kind and "mpjpe" in row]
         if own:

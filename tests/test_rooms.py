@@ -45,6 +45,7 @@ ROOMS = (
     "solver.evaluate",
     "solver.report",
     "solver.commands",
+    "solver.subject",
     "solver.bench",
     "widgets",
     "widgets.plots",

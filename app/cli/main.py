@@ -170,7 +170,12 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _solve_options(solve: argparse.ArgumentParser) -> None:
-    solve.add_argument("markers", type=Path, metavar="MARKERS|SESSION|SUBJECT", help="C3D, TRC, CSV or TSV file, a session, or a subject's TOML file")
+    solve.add_argument(
+        "markers",
+        type=Path,
+        metavar="MARKERS|SESSION|SUBJECT",
+        help="C3D, TRC, CSV or TSV file, a session, or a subject's TOML file",
+    )
     solve.add_argument("--out", type=Path, metavar="DIR", help="folder for the results (a session has its own)")
 
     inputs = solve.add_argument_group("beside the markers")

@@ -16,7 +16,12 @@ from markerscope.solver.pipeline.stages_known import GRAPH_KNOWN
 from markerscope.solver.pipeline.stages_neural import GRAPH_NEURAL
 from markerscope.solver.pipeline.stages_paper import GRAPH_PAPER
 
-GRAPHS: dict[Method, tuple[Stage, ...]] = {"bundle": GRAPH, "paper": GRAPH_PAPER, "neural": GRAPH_NEURAL, "known": GRAPH_KNOWN}
+GRAPHS: dict[Method, tuple[Stage, ...]] = {
+    "bundle": GRAPH,
+    "paper": GRAPH_PAPER,
+    "neural": GRAPH_NEURAL,
+    "known": GRAPH_KNOWN,
+}
 
 
 def graph_of(session: Session) -> tuple[Stage, ...]:

@@ -24,7 +24,16 @@ from markerscope.solver.pipeline.inputs import LandmarkSettings, MarkerSettings,
 from markerscope.solver.pipeline.stage import NoSettings, Stage
 from markerscope.solver.sync.offset import Sync
 
-SOURCES = ("marker_file", "video_file", "prior_file", "camera_file", "body_file", "weights_file", "neutral_file", "known_file")
+SOURCES = (
+    "marker_file",
+    "video_file",
+    "prior_file",
+    "camera_file",
+    "body_file",
+    "weights_file",
+    "neutral_file",
+    "known_file",
+)
 """The files a session is made from, by the names ``session.toml`` has for them."""
 POSED_BY = {"video_file", "prior_file", "known_file"}
 """Of these a session has at least one: where poses come from."""

@@ -8,25 +8,32 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from markerscope.solver.body.bones import load_body
+from markerscope.solver.body.model import Body
 from markerscope.solver.commands.solve import solve_session
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.progress import Progress, part_of, silent
 from markerscope.solver.core.request import SolveOutcome, SolveRequest, option
 from markerscope.solver.fit.known.body import known_body
 from markerscope.solver.fit.known.person_file import write_person
+from markerscope.solver.fit.results import Localization
 from markerscope.solver.io import load_markers
 from markerscope.solver.io.atomic import make_folder, write_text_atomic
-from markerscope.solver.pipeline.names import FIT
+from markerscope.solver.pipeline.names import FIT, LOCALIZE, ORIENT
 from markerscope.solver.pipeline.run import run_stages
-from markerscope.solver.pipeline.session import load_session
+from markerscope.solver.pipeline.session import load_session, save_session
 from markerscope.solver.subject.order import determining, neutral_of
 from markerscope.solver.subject.report import SubjectReport, TrialRow, write_subject_report
+from markerscope.solver.subject.resolve import CLEAR, resolve
 from markerscope.solver.subject.standing import write_standing
 from markerscope.solver.subject.subject_file import Subject, Trial, read_subject
 
 PERSON, ABOUT, REPORT = "person.npz", "subject.json", "report.html"
 _FOR_ALL = {"markers", "out", "seed", "body", "convention", "landmark_pull", "neutral", "method"}
+_DECIDING = 2
+"""Movements that decide what a standing pose left open."""
 _WITH_VIDEO, _ALONE = 12.0, 4.0
 """How long a trial takes beside others; only the progress bar believes it."""
 
@@ -87,6 +94,7 @@ class _Work:
         self._progress = progress
         self._cost = {t.name: _WITH_VIDEO if t.video or t.role == "static" else _ALONE for t in subject.trials}
         self._done = 0.0
+        self._notes: list[str] = []
         self._neutral = neutral_of(subject) if request.neutral is None else None
 
     def determine(self, order: tuple[Trial, ...]) -> Trial:
@@ -96,6 +104,8 @@ class _Work:
             if not trial.posed:
                 own = replace(own, prior=self._standing(trial), offset=0.0)
             if self._solve(trial, own, determines=True):
+                if not trial.posed:
+                    self._resolve(trial, own)
                 self._write_person(trial)
                 return trial
         raise InputError(
@@ -123,6 +133,7 @@ class _Work:
         warnings = tuple(f"{row.name}: {doubt}" for row in rows for doubt in row.doubts)
         lines = (
             f"{self.subject.name}: {len(solved)} of {len(rows)} trials solved; {first.name} says what body it is.",
+            *self._notes,
             *(_line(row) for row in solved),
             f"Results are in {self.out}.",
         )
@@ -130,6 +141,7 @@ class _Work:
             "out": str(self.out),
             "subject": self.subject.name,
             "determined_by": first.name,
+            "notes": self._notes,
             "trials": [asdict(row) for row in rows],
             "warnings": list(warnings),
         }
@@ -184,9 +196,7 @@ class _Work:
         except InputError as error:
             self.ends[trial.name] = TrialEnd(trial.name, "refused", determines, (str(error),))
             return False
-        self.ends[trial.name] = TrialEnd(
-            trial.name, "solved", determines, (*done.warnings, *more), dict(done.summary)
-        )
+        self.ends[trial.name] = TrialEnd(trial.name, "solved", determines, (*done.warnings, *more), dict(done.summary))
         return True
 
     def _share(self, trial: Trial) -> Progress:
@@ -195,18 +205,57 @@ class _Work:
         whole = part_of(self._progress, 0.98 * start, 0.98 * min(self._done / total, 1.0))
         return _Named(whole, f"{trial.name}: ")
 
-    def _write_person(self, trial: Trial) -> None:
+    def _resolve(self, trial: Trial, own: SolveRequest) -> None:
+        """Have the movements say which of a standing trial's answers is right, and solve it again if it is another."""
         session = load_session(self.out / trial.name)
-        body_file = session.inputs.get("body_file")
-        motion = run_stages(session, ("fit",))[FIT]
-        write_person(self.out / PERSON, known_body(load_body(body_file.path if body_file else None), motion))
+        graph = run_stages(session, ("fit",))
+        found, ranked = graph[LOCALIZE], graph[ORIENT]
+        assert isinstance(found, Localization)
+        at = 0.98 * self._done / sum(self._cost.values())
+        progress = _Named(part_of(self._progress, at, at), f"{trial.name}: movements decide: ")
+        told = resolve(self._body(), ranked, found.markers, self._movements(trial), progress)
+        if told.row != graph[FIT].chosen and told.margin >= CLEAR:
+            edits = {**session.edits, "fit": {**session.edits.get("fit", {}), "candidate": told.row}}
+            save_session(replace(session, edits=edits))
+            self._solve(trial, replace(own, markers=self.out / trial.name, out=None), determines=True)
+        end = self.ends[trial.name]
+        settled = bool(told.trials) and told.margin >= CLEAR
+        if settled:
+            self._notes.append(told.sentence)
+        else:
+            end = replace(end, doubts=(*end.doubts, told.sentence))
+        self.ends[trial.name] = end
+
+    def _movements(self, static: Trial) -> dict[str, np.ndarray]:
+        """Markers of the trials that may tell what a standing pose cannot: a few of those that move."""
+        found: dict[str, np.ndarray] = {}
+        for trial in self.subject.trials:
+            if trial.role == "static" or trial.markers_moved or len(found) == _DECIDING:
+                continue
+            try:
+                read = load_markers(
+                    trial.markers, up=trial.up, units=trial.units, subject=trial.person, rate=trial.rate
+                )
+                found[trial.name] = read.between(trial.start, trial.stop).positions
+            except InputError:
+                continue
+        return found
+
+    def _body(self) -> Body:
+        return load_body(self.request.body)
+
+    def _write_person(self, trial: Trial) -> None:
+        motion = run_stages(load_session(self.out / trial.name), ("fit",))[FIT]
+        write_person(self.out / PERSON, known_body(self._body(), motion))
 
     def _say(self, rows: list[TrialEnd]) -> None:
         about = {"subject": self.subject.name, "trials": [asdict(row) for row in rows]}
         write_text_atomic(self.out / ABOUT, json.dumps(about, indent=1, default=str) + "\n")
         write_subject_report(
             self.out / REPORT,
-            SubjectReport(self.subject.name, tuple(_row(row, self.out) for row in rows), _zero(self._neutral)),
+            SubjectReport(
+                self.subject.name, tuple(_row(row, self.out) for row in rows), _zero(self._neutral), tuple(self._notes)
+            ),
         )
 
 

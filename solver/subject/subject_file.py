@@ -161,7 +161,9 @@ def _trial(row: Mapping[str, Any], number: int, path: Path) -> Trial:
             given[key] = row[key]
     if "range" in row:
         ends = row["range"]
-        if not (isinstance(ends, list) and len(ends) == 2 and all(_is_number(end) for end in ends) and ends[0] < ends[1]):
+        if not (
+            isinstance(ends, list) and len(ends) == 2 and all(_is_number(end) for end in ends) and ends[0] < ends[1]
+        ):
             raise InputError("its range is not two rising times", where, "write range = [2.5, 10.0], in seconds")
         given["start"], given["stop"] = float(ends[0]), float(ends[1])
     return Trial(**given)

@@ -21,7 +21,7 @@ class KnownBody:
     ----------
     betas : (S,) shape, bone lengths last
     placement : (U) markers on the body at rest
-    markers : (U,) index of each among the trial's markers
+    markers : (U,) index of each among the trial's markers, -1 for one that other trials placed
     poses : (P, 24, 3, 3) parent-relative rotations that the person was seen in, root included
     off_m : m, how far the markers are from their places on average where the person was seen; NaN where unknown
     """

@@ -161,9 +161,7 @@ def _bent(body: Body, known: KnownBody, points: np.ndarray, starts: list[Pose]) 
     count = len(known.placement.rest)
     surface = Surface(np.zeros((count, 3)), np.tile([0.0, 0, 1], (count, 1)))
     none = Points.none(body.shape_count)
-    pose = Pose(
-        np.concatenate([s.rotations for s in starts]), np.concatenate([s.trans for s in starts]), known.betas
-    )
+    pose = Pose(np.concatenate([s.rotations for s in starts]), np.concatenate([s.trans for s in starts]), known.betas)
     for reach in _REACH_M:
         match = _matched(_placed(body, known, pose), points, reach)
         target = np.where((match >= 0)[..., None], points[np.clip(match, 0, None)], np.nan)

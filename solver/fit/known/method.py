@@ -25,7 +25,7 @@ from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.problem import Problem
 from markerscope.solver.fit.results import Candidate, FittedMotion, Localization, Orientation
 from markerscope.solver.fit.settings import FitSettings
-from markerscope.solver.fit.state import Camera, Observations, State, Surface, Weights
+from markerscope.solver.fit.state import Camera, Observations, State, Surface
 
 WEIGHTS = replace(NO_VIDEO, free_shape=False, free_placement=False)
 """Of every trial of a known person."""
@@ -146,6 +146,20 @@ def ranked(
     judged = said(comparison(body, known, tracked, seen.markers), known.off_m, moved=settings.markers_moved)
     confidence = min(_sure(margin), judged.cap)
     return Orientation(rows, float(margin), 1 if order else -1, confidence, judged.doubts)
+
+
+def energy_of(body: Body, known: KnownBody, tracked: Tracked, markers: np.ndarray) -> float:
+    """What the best answer costs a frame in a trial (T, M, 3) m, joints that turn as they seldom do included."""
+    best = tracked.tracks[0]
+    used = np.flatnonzero(best.place >= 0)
+    some, state, surface = _begun(
+        body, known, markers[:, used], best.frames, best.place[used], best.rotations, best.trans
+    )
+    problem = Problem(body, some, _none(body))
+    state, surface, _ = descend(problem, state, surface, (_HELD,), WEIGHTS)
+    found = problem.energies(state, WEIGHTS, surface)
+    unseen = len(known.placement.rest) - len(set(best.place[used].tolist()))
+    return found.markers + found.anatomical + unseen * (_HELD.kernel / _HELD.marker) ** 2
 
 
 def comparison(body: Body, known: KnownBody, tracked: Tracked, markers: np.ndarray) -> Compared:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,8 @@ def write_person(path: str | Path, known: KnownBody) -> None:
     at = known.placement
     arrays = (known.betas, at.rest, at.dirs, at.weights, known.markers, known.poses, np.array(known.off_m))
     content = io.BytesIO()
-    np.savez_compressed(content, format=np.array(_FORMAT), **dict(zip(_NAMES, arrays)))
+    named: dict[str, Any] = {"format": np.array(_FORMAT), **dict(zip(_NAMES, arrays))}
+    np.savez_compressed(content, **named)
     write_bytes_atomic(path, content.getvalue())
 
 

@@ -16,8 +16,8 @@ from markerscope.solver.fit.state import Observations, State, Surface, Weights
 CAP = 0.6
 _LEAST_SHARE = 0.7
 _USUAL_M, _TIMES, _MORE_M = 0.004, 1.8, 0.0025
-"""m and 1: markers this much further off than elsewhere are not where the person's are. Fixed on 16 synthetic trials of the
-same person (1.0 to 1.2 times) and six real ones (1.1 to 1.3); of another person it was 3.3 and more.
+"""m and 1: markers this much further off than elsewhere are not where the person's are. Fixed on
+16 synthetic trials of the same person (1.0 to 1.2 times) and six real ones (1.1 to 1.3); of others it was 3.3 and more.
 """
 _SHAPE_GAIN = 0.3
 """Of what free places gain a free shape gains so much, if it is another person."""
@@ -67,32 +67,30 @@ def said(found: Compared, usual_m: float, *, moved: bool) -> Said:
     doubts = []
     if found.share < _LEAST_SHARE:
         doubts.append(
-            f"Only {100 * found.share:.0f} % of the person's markers were found in this trial: check that it is of this "
-            "person with the same markers."
+            f"Only {100 * found.share:.0f} % of the person's markers were found in this trial: check that it is of "
+            "this person with the same markers."
         )
     usual = usual_m if np.isfinite(usual_m) else _USUAL_M
     if found.held_m > max(_TIMES * usual, usual + _MORE_M):
-        held = f"Markers are {1000 * found.held_m:.0f} mm from the person's places on average, {1000 * usual:.0f} elsewhere"
+        held = f"Markers are {1000 * found.held_m:.0f} mm from the person's places ({1000 * usual:.0f} elsewhere)"
         gain = (found.held_m - found.shape_m) / max(found.held_m - found.places_m, 1e-4)
         if gain >= _SHAPE_GAIN:
             doubts.append(
                 f"{held}, and another shape of body brings them to {1000 * found.shape_m:.0f} mm "
-                f"({found.bone.replace('_', ' ')} {100 * found.longer:.0f} % off in length): this is likely another person; "
-                "solve the trial apart from this subject."
+                f"({found.bone.replace('_', ' ')} {100 * found.longer:.0f} % off in length): this is likely another "
+                "person; solve the trial apart from this subject."
             )
         elif not moved:
             count = int((found.moved_m > _MOVED_M).sum())
             doubts.append(
-                f"{held}, and other places bring them to {1000 * found.places_m:.0f} mm ({count} of {len(found.moved_m)} "
-                f"markers by more than {1000 * _MOVED_M:.0f} mm): markers were likely moved between the trials; if so, say "
-                "markers_moved = true."
+                f"{held}, and other places bring them to {1000 * found.places_m:.0f} mm ({count} of "
+                f"{len(found.moved_m)} markers by more than {1000 * _MOVED_M:.0f} mm): markers were "
+                "likely moved between the trials; if so, say markers_moved = true."
             )
     return Said(tuple(doubts), CAP if doubts else 1.0)
 
 
-def compare(
-    body: Body, seen: Observations, state: State, surface: Surface, base: Weights, share: float
-) -> Compared:
+def compare(body: Body, seen: Observations, state: State, surface: Surface, base: Weights, share: float) -> Compared:
     """What freeing the shape, and freeing the places, would gain.
 
     Parameters
@@ -111,9 +109,7 @@ def compare(
     before, after = (_lengths(body, one) for one in (held, shaped))
     change = np.abs(after / np.maximum(before, 1e-3) - 1)
     limb = int(change.argmax())
-    slid = np.linalg.norm(
-        placed.placement.shaped(placed.pose.betas) - held.placement.shaped(held.pose.betas), axis=1
-    )
+    slid = np.linalg.norm(placed.placement.shaped(placed.pose.betas) - held.placement.shaped(held.pose.betas), axis=1)
     return Compared(off[0], off[1], off[2], float(change[limb]), JOINTS[limb], slid, share)
 
 
@@ -123,7 +119,9 @@ def _off(body: Body, problem: Problem, state: State) -> float:
     return float(np.nanmean(gap))
 
 
-_LIMBS = np.array([JOINTS.index(f"{side}_{joint}") for side in ("left", "right") for joint in ("knee", "ankle", "elbow", "wrist")])
+_LIMBS = np.array(
+    [JOINTS.index(f"{side}_{joint}") for side in ("left", "right") for joint in ("knee", "ankle", "elbow", "wrist")]
+)
 
 
 def _lengths(body: Body, state: State) -> np.ndarray:

@@ -73,7 +73,12 @@ class Tracked:
 
 
 def follow(
-    body: Body, known: KnownBody, markers: np.ndarray, keyframes: int = 40, progress: Progress = silent
+    body: Body,
+    known: KnownBody,
+    markers: np.ndarray,
+    keyframes: int = 40,
+    progress: Progress = silent,
+    reach: float = LOST_M,
 ) -> Tracked:
     """The known person in a trial.
 
@@ -82,6 +87,7 @@ def follow(
     body : the one that ``known`` was fitted with
     markers : (T, M, 3) m, internal lab frame, z up, NaN = lost; unlabelled
     keyframes : how many frames the answers are compared on
+    reach : m, how far a marker may be from its place and still be told; more where places are known roughly
 
     Raises
     ------
@@ -104,7 +110,7 @@ def follow(
         share = part_of(progress, 0.6 + 0.4 * i / (_RIVALS + 1), 0.6 + 0.4 * (i + 1) / (_RIVALS + 1))
         # What is far behind in single frames is followed in a few alone, to say how far.
         count = keyframes if group[0][1].cost < _FAR_BEHIND * best else _FEW
-        tracks.append(_carried(body, known, markers, group, count, share))
+        tracks.append(_carried(body, known, markers, group, count, share, reach))
     tracks.sort(key=lambda track: track.cost)
     different = [tracks[0], *(t for t in tracks[1:] if not _same_places(t.place, tracks[0].place))]
     return Tracked(tuple(different), looked)
@@ -168,6 +174,7 @@ def _carried(
     group: list[tuple[int, Found]],
     keyframes: int,
     progress: Progress,
+    reach: float,
 ) -> Track:
     """An answer of single frames carried to keyframes of the whole trial, the columns told by all of them."""
     best = group[0][1]
@@ -186,7 +193,7 @@ def _carried(
         pose = solved(body, known, markers[frames], place, pose.at(nearest))
         at = frames
         where = place_points(known.placement, forward(body, pose), known.betas)
-        place = told(where, markers[frames], markers)
+        place = told(where, markers[frames], markers, reach if round_ == _ROUNDS - 1 else LOST_M)
     # Once more with the columns as they are told now.
     pose = solved(body, known, markers[at], place, pose)
     where = place_points(known.placement, forward(body, pose), known.betas)
@@ -236,7 +243,7 @@ def surface_of(body: Body, placement: Points, betas: np.ndarray) -> Surface:
     return Skin(body, betas).attach(placement.shaped(betas))[1]
 
 
-def told(where: np.ndarray, seen: np.ndarray, whole: np.ndarray) -> np.ndarray:
+def told(where: np.ndarray, seen: np.ndarray, whole: np.ndarray, reach: float = LOST_M) -> np.ndarray:
     """(M,) which place each column is.
 
     One to one at first; what is left over then joins a place whose columns are seen at other times.
@@ -246,6 +253,7 @@ def told(where: np.ndarray, seen: np.ndarray, whole: np.ndarray) -> np.ndarray:
     where : (N, U, 3) m, the places in the keyframes
     seen : (N, M, 3) m, the columns in the keyframes
     whole : (T, M, 3) the columns in all frames
+    reach : m, how far a column may be from its place
     """
     present = np.isfinite(whole).all(axis=2)
     off = np.full((seen.shape[1], where.shape[1]), np.inf)
@@ -255,10 +263,10 @@ def told(where: np.ndarray, seen: np.ndarray, whole: np.ndarray) -> np.ndarray:
             off[m] = np.median(np.linalg.norm(where[rows] - seen[rows, None, m], axis=2), axis=0)
     # A column seen throughout says more than a piece of a track.
     share = np.maximum(present.mean(axis=0), 1e-3)[:, None]
-    gain = share * (np.minimum(off, LOST_M) ** 2 - LOST_M**2)
+    gain = share * (np.minimum(off, reach) ** 2 - reach**2)
     rows, columns = linear_sum_assignment(gain)
     place = np.full(seen.shape[1], -1)
-    near = off[rows, columns] < LOST_M
+    near = off[rows, columns] < reach
     place[rows[near]] = columns[near]
     for m in np.argsort(off.min(axis=1), kind="stable"):
         u = int(off[m].argmin())
