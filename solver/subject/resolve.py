@@ -17,7 +17,7 @@ from markerscope.solver.fit.known.track import follow
 from markerscope.solver.fit.results import Candidate, Orientation
 
 _ANSWERS = 3
-_KEYFRAMES = 16
+KEYFRAMES = 16
 CLEAR = 1.3
 """Movements that cost the next way less than so many times as much settle nothing."""
 
@@ -108,7 +108,7 @@ def resolve(
             at = (i + k / len(movements)) / len(rows)
             share = part_of(progress, at, at + 1 / len(rows) / len(movements))
             try:
-                tracked = follow(body, known, markers, _KEYFRAMES, share)
+                tracked = follow(body, known, markers, KEYFRAMES, share)
                 costs.append(energy_of(body, known, tracked, markers))
             except InputError:
                 continue

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -16,9 +17,12 @@ from markerscope.solver.commands.solve import solve_session
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.progress import Progress, part_of, silent
 from markerscope.solver.core.request import SolveOutcome, SolveRequest, option
-from markerscope.solver.fit.known.body import known_body
+from markerscope.solver.fit.known.body import KnownBody, known_body
 from markerscope.solver.fit.known.person_file import write_person
+from markerscope.solver.fit.known.together import Followed, estimated_together, placed_anew
+from markerscope.solver.fit.known.track import follow
 from markerscope.solver.fit.results import Localization
+from markerscope.solver.fit.settings import FitSettings
 from markerscope.solver.io import load_markers
 from markerscope.solver.io.atomic import make_folder, write_text_atomic
 from markerscope.solver.pipeline.names import FIT, LOCALIZE, ORIENT
@@ -26,7 +30,7 @@ from markerscope.solver.pipeline.run import run_stages
 from markerscope.solver.pipeline.session import load_session, save_session
 from markerscope.solver.subject.order import determining, neutral_of
 from markerscope.solver.subject.report import SubjectReport, TrialRow, write_subject_report
-from markerscope.solver.subject.resolve import CLEAR, resolve
+from markerscope.solver.subject.resolve import CLEAR, KEYFRAMES, resolve
 from markerscope.solver.subject.standing import write_standing
 from markerscope.solver.subject.subject_file import Subject, Trial, read_subject
 
@@ -80,8 +84,8 @@ def solve_subject(request: SolveRequest, progress: Progress = silent) -> SolveOu
     work = _Work(subject, request, out, progress)
     first = work.determine(order)
     for trial in subject.trials:
-        if trial.name not in work.ends:
-            work.follow(trial, first)
+        if trial.name not in work.ends or (trial == first and not first.posed):
+            work.follow(trial)
     return work.end(first)
 
 
@@ -95,6 +99,7 @@ class _Work:
         self._cost = {t.name: _WITH_VIDEO if t.video or t.role == "static" else _ALONE for t in subject.trials}
         self._done = 0.0
         self._notes: list[str] = []
+        self._open: tuple[str, ...] = ()
         self._neutral = neutral_of(subject) if request.neutral is None else None
 
     def determine(self, order: tuple[Trial, ...]) -> Trial:
@@ -102,7 +107,7 @@ class _Work:
         for trial in order:
             own = self._request(trial)
             if not trial.posed:
-                own = replace(own, prior=self._standing(trial), offset=0.0)
+                own = replace(own, out=self._first(trial), prior=self._standing(trial), offset=0.0)
             if self._solve(trial, own, determines=True):
                 if not trial.posed:
                     self._resolve(trial, own)
@@ -114,15 +119,20 @@ class _Work:
             "mend one of them, or give another trial a video or a prior",
         )
 
-    def follow(self, trial: Trial, first: Trial) -> None:
+    def follow(self, trial: Trial) -> None:
         """Solve a trial by the body that is known."""
         person = self.out / PERSON
         own = replace(self._request(trial), known=person, method=None if trial.posed else "known")
         if not trial.posed:
-            own = replace(own, markers_moved=trial.markers_moved or None)
+            own = replace(own, markers_moved=trial.markers_moved or None, landmark_pull=None)
         elif trial.markers_moved:  # its own video says where they are now
             own = replace(own, known=None)
-        self._solve(trial, own)
+        determines = trial.name in self.ends and self.ends[trial.name].determines
+        before = self.ends.get(trial.name)
+        self._solve(trial, own, determines)
+        if before is not None and determines:  # what its own solve had against it stands
+            end = self.ends[trial.name]
+            self.ends[trial.name] = replace(end, doubts=(*self._open, *end.doubts))
 
     def end(self, first: Trial) -> SolveOutcome:
         """The report, and what to say."""
@@ -168,7 +178,7 @@ class _Work:
             body=whole.body,
             convention=whole.convention,
             neutral=whole.neutral if self._neutral is None else self._neutral.markers,
-            landmark_pull=None if not trial.posed and trial.role != "static" else whole.landmark_pull,
+            landmark_pull=whole.landmark_pull,
         )
 
     def _camera(self, trial: Trial) -> Path | None:
@@ -177,6 +187,10 @@ class _Work:
         if trial.camera in {other.name for other in self.subject.trials}:
             return self.out / trial.camera
         return self.subject.file.parent / trial.camera
+
+    def _first(self, trial: Trial) -> Path:
+        """Folder of the solve that determines the body: a static trial alone is solved apart, and again by the body."""
+        return self.out / trial.name if trial.posed else self.out / "standing" / trial.name
 
     def _standing(self, trial: Trial) -> Path:
         markers = load_markers(trial.markers, up=trial.up, units=trial.units, subject=trial.person, rate=trial.rate)
@@ -207,7 +221,7 @@ class _Work:
 
     def _resolve(self, trial: Trial, own: SolveRequest) -> None:
         """Have the movements say which of a standing trial's answers is right, and solve it again if it is another."""
-        session = load_session(self.out / trial.name)
+        session = load_session(self._first(trial))
         graph = run_stages(session, ("fit",))
         found, ranked = graph[LOCALIZE], graph[ORIENT]
         assert isinstance(found, Localization)
@@ -217,14 +231,14 @@ class _Work:
         if told.row != graph[FIT].chosen and told.margin >= CLEAR:
             edits = {**session.edits, "fit": {**session.edits.get("fit", {}), "candidate": told.row}}
             save_session(replace(session, edits=edits))
-            self._solve(trial, replace(own, markers=self.out / trial.name, out=None), determines=True)
+            self._solve(trial, replace(own, markers=self._first(trial), out=None), determines=True)
         end = self.ends[trial.name]
         settled = bool(told.trials) and told.margin >= CLEAR
         if settled:
             self._notes.append(told.sentence)
         else:
-            end = replace(end, doubts=(*end.doubts, told.sentence))
-        self.ends[trial.name] = end
+            self._open = (told.sentence,)
+            self.ends[trial.name] = replace(end, doubts=(*end.doubts, told.sentence))
 
     def _movements(self, static: Trial) -> dict[str, np.ndarray]:
         """Markers of the trials that may tell what a standing pose cannot: a few of those that move."""
@@ -232,21 +246,50 @@ class _Work:
         for trial in self.subject.trials:
             if trial.role == "static" or trial.markers_moved or len(found) == _DECIDING:
                 continue
-            try:
-                read = load_markers(
-                    trial.markers, up=trial.up, units=trial.units, subject=trial.person, rate=trial.rate
-                )
-                found[trial.name] = read.between(trial.start, trial.stop).positions
-            except InputError:
-                continue
+            with suppress(InputError):
+                found[trial.name] = self._markers(trial)
         return found
 
     def _body(self) -> Body:
         return load_body(self.request.body)
 
     def _write_person(self, trial: Trial) -> None:
-        motion = run_stages(load_session(self.out / trial.name), ("fit",))[FIT]
-        write_person(self.out / PERSON, known_body(self._body(), motion))
+        motion = run_stages(load_session(self._first(trial)), ("fit",))[FIT]
+        known = known_body(self._body(), motion)
+        movements = {} if trial.posed else self._movements(trial)
+        if movements:
+            known = self._moving(trial, known, movements)
+        write_person(self.out / PERSON, known)
+
+    def _moving(self, static: Trial, known: KnownBody, movements: dict[str, np.ndarray]) -> KnownBody:
+        """A person found standing, as the movements have them: shape and places of all estimated together."""
+        body = self._body()
+        first = self._followed(body, known, movements)
+        if not first:
+            return known
+        placed = placed_anew(body, known, first)
+        again = self._followed(body, placed, {**movements, static.name: self._markers(static)})
+        settings = FitSettings(landmark_pull=self.request.landmark_pull or "earned")
+        found = estimated_together(body, placed, again, settings)
+        self._notes.append(
+            f"Shape and places of {len(found.placement.rest)} markers were estimated over "
+            f"{', '.join((static.name, *movements))} together: markers are {1000 * found.off_m:.1f} mm from their "
+            "places on average."
+        )
+        return found
+
+    def _followed(self, body: Body, known: KnownBody, trials: dict[str, np.ndarray]) -> list[Followed]:
+        """The person in those of the trials in which they can be found."""
+        found = []
+        for markers in trials.values():
+            with suppress(InputError):
+                found.append(Followed(markers, follow(body, known, markers, KEYFRAMES).tracks[0]))
+        return found
+
+    def _markers(self, trial: Trial) -> np.ndarray:
+        """(T, M, 3) m, of a trial as its file has them."""
+        read = load_markers(trial.markers, up=trial.up, units=trial.units, subject=trial.person, rate=trial.rate)
+        return read.between(trial.start, trial.stop).positions
 
     def _say(self, rows: list[TrialEnd]) -> None:
         about = {"subject": self.subject.name, "trials": [asdict(row) for row in rows]}

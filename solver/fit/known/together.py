@@ -11,7 +11,7 @@ from markerscope.solver.body.model import Body
 from markerscope.solver.fit.bundle import Phase, descend, reassign
 from markerscope.solver.fit.kinematics import Points, Pose, forward, place_points
 from markerscope.solver.fit.known.body import KnownBody, spread_out
-from markerscope.solver.fit.known.track import LOST_M, Track, surface_of
+from markerscope.solver.fit.known.track import Track, surface_of
 from markerscope.solver.fit.labelled.solve import NO_VIDEO, observed
 from markerscope.solver.fit.problem import Problem
 from markerscope.solver.fit.pull.stage import to_landmarks
@@ -19,7 +19,13 @@ from markerscope.solver.fit.settings import FitSettings
 from markerscope.solver.fit.state import Camera, State
 
 _OFTEN = 0.5
-_PHASES = (Phase(0.03, 0.3, 4, free_placement=True), Phase(0.02, 0.08, 6, free_placement=True), Phase(0.01, 0.04, 8, free_placement=True))
+_FRESH_M = 0.10
+"""How far a marker may be from the skin that it moves with before the other places have given way to it."""
+_PHASES = (
+    Phase(0.03, 0.3, 4, free_placement=True),
+    Phase(0.02, 0.08, 6, free_placement=True),
+    Phase(0.01, 0.04, 8, free_placement=True),
+)
 
 
 @dataclass(frozen=True)
@@ -87,7 +93,7 @@ def placed_anew(body: Body, known: KnownBody, trials: Sequence[Followed]) -> Kno
     state = State(pose, kept, Camera(np.eye(3), np.zeros(3), np.zeros(3), 1.0))
     state, _ = reassign(Problem(body, seen, none), state, NO_VIDEO)
     off = np.linalg.norm(place_points(state.placement, forward(body, pose), known.betas) - seen.markers, axis=2)
-    own = np.flatnonzero(np.nanmedian(off, axis=0) < LOST_M)
+    own = np.flatnonzero(np.nanmedian(off, axis=0) < _FRESH_M)
     fresh = state.placement.take(own)
     placement = Points(
         np.concatenate([kept.rest, fresh.rest]),
