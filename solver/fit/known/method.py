@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -159,7 +159,7 @@ def energy_of(body: Body, known: KnownBody, tracked: Tracked, markers: np.ndarra
     state, surface, _ = descend(problem, state, surface, (_HELD,), WEIGHTS)
     found = problem.energies(state, WEIGHTS, surface)
     unseen = len(known.placement.rest) - len(set(best.place[used].tolist()))
-    return found.markers + found.anatomical + unseen * (_HELD.kernel / _HELD.marker) ** 2
+    return found["markers"] + found["anatomical"] + unseen * (_HELD.kernel / _HELD.marker) ** 2
 
 
 def comparison(body: Body, known: KnownBody, tracked: Tracked, markers: np.ndarray) -> Compared:
@@ -217,7 +217,7 @@ def _candidate(
     return Candidate(
         hypothesis=row,
         refined=refined,
-        energies=asdict(energies),
+        energies=dict(energies.by_term),
         energy=energies.total,
         bone=bone,
         vertex=Skin(body, betas).nearest_vertex(placement.shaped(betas)),
@@ -238,7 +238,7 @@ def _candidate(
 
 def _none(body: Body) -> Points:
     """No landmarks of a video."""
-    return Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
+    return Points.none(body.shape_count)
 
 
 def _sure(margin: float) -> float:

@@ -100,7 +100,7 @@ def compare(body: Body, seen: Observations, state: State, surface: Surface, base
     base : weights with shape and places held
     share : of the person's markers that were found in the trial
     """
-    none = Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
+    none = Points.none(body.shape_count)
     problem = Problem(body, seen, none)
     held, _, _ = descend(problem, state, surface, (_FIT,), base)
     shaped, _, _ = descend(problem, held, surface, (_FIT,), replace(base, free_shape=True))

@@ -58,7 +58,7 @@ def estimated_together(body: Body, known: KnownBody, trials: Sequence[Followed],
             known.betas,
         ),
     )
-    none = Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
+    none = Points.none(body.shape_count)
     camera = Camera(np.eye(3), np.zeros(3), np.zeros(3), 1.0)
     state, surface = State(start, known.placement, camera), surface_of(body, known.placement, known.betas)
     free = replace(NO_VIDEO, free_shape=True, free_placement=True)
@@ -89,7 +89,7 @@ def placed_anew(body: Body, known: KnownBody, trials: Sequence[Followed]) -> Kno
         return replace(known, placement=kept, markers=known.markers[borne_out])
     pose = Pose(main.track.rotations, main.track.trans, known.betas)
     seen = observed(main.markers[main.track.frames][:, left_over], pose)
-    none = Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
+    none = Points.none(body.shape_count)
     state = State(pose, kept, Camera(np.eye(3), np.zeros(3), np.zeros(3), 1.0))
     state, _ = reassign(Problem(body, seen, none), state, NO_VIDEO)
     off = np.linalg.norm(place_points(state.placement, forward(body, pose), known.betas) - seen.markers, axis=2)

@@ -232,7 +232,7 @@ def solved(body: Body, known: KnownBody, markers: np.ndarray, place: np.ndarray,
     start = set_on_markers(body, seen, placement, start)
     held = replace(NO_VIDEO, prior_deg=_JOINT_DEG, root_deg=_ROOT_DEG, anatomical=0.1)
     camera = Camera(np.eye(3), np.zeros(3), np.zeros(3), 1.0)
-    none = Points(np.zeros((0, 3)), np.zeros((0, 3, body.shape_count)), np.zeros((0, 24)))
+    none = Points.none(body.shape_count)
     state = State(start, placement, camera)
     surface = surface_of(body, placement, known.betas)
     return settle(body, seen, none, state, surface, held, start, _WIDE).pose
