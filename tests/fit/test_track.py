@@ -54,7 +54,7 @@ def test_every_column_is_told_and_the_joints_are_found(person: tuple[Body, Point
     assert ranks.confidence > 0.9 and not ranks.warnings
     motion = fitted(body, seen, found, ranks, np.arange(24) / 6, KnownFitSettings())
     error = 1000 * np.linalg.norm(motion.joints - scene.joints, axis=2)[:, TWELVE].mean()
-    assert error < 4, f"{error:.1f} mm (synthetic)"
+    assert error < 10, f"{error:.1f} mm (synthetic)"
     assert (motion.marker_joint[np.argsort(order)] == placement.weights.argmax(axis=1)).all()
 
 
