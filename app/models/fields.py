@@ -26,6 +26,7 @@ TITLES = {
     "localize": "Localization",
     "solve": "Solving",
     "orient": "Orientation",
+    "known": "Known person",
     "network": "Network",
     "fit": "Fit",
     "neutral": "Neutral pose",
