@@ -97,6 +97,9 @@ class _Work:
         self.ends: dict[str, TrialEnd] = {}
         self._progress = progress
         self._cost = {t.name: _WITH_VIDEO if t.video or t.role == "static" else _ALONE for t in subject.trials}
+        # A static trial alone is solved twice: standing, and by the body that the movements make of it.
+        again = 0.0 if any(trial.posed for trial in subject.trials) else _WITH_VIDEO
+        self._total = sum(self._cost.values()) + again
         self._done = 0.0
         self._notes: list[str] = []
         self._open: tuple[str, ...] = ()
@@ -214,8 +217,8 @@ class _Work:
         return True
 
     def _share(self, trial: Trial) -> Progress:
-        total = sum(self._cost.values())
-        start, self._done = self._done / total, self._done + self._cost[trial.name]
+        total = self._total
+        start, self._done = min(self._done / total, 1.0), self._done + self._cost[trial.name]
         whole = part_of(self._progress, 0.98 * start, 0.98 * min(self._done / total, 1.0))
         return _Named(whole, f"{trial.name}: ")
 
@@ -225,7 +228,7 @@ class _Work:
         graph = run_stages(session, ("fit",))
         found, ranked = graph[LOCALIZE], graph[ORIENT]
         assert isinstance(found, Localization)
-        at = 0.98 * self._done / sum(self._cost.values())
+        at = 0.98 * self._done / self._total
         progress = _Named(part_of(self._progress, at, at), f"{trial.name}: movements decide: ")
         told = resolve(self._body(), ranked, found.markers, self._movements(trial), progress)
         if told.row != graph[FIT].chosen and told.margin >= CLEAR:
