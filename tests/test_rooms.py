@@ -47,6 +47,7 @@ ROOMS = (
     "solver.commands",
     "solver.subject",
     "solver.bench",
+    "solver.api",
     "widgets",
     "widgets.plots",
     "widgets.tables",

@@ -1,6 +1,6 @@
 """Make this tree's folders importable as ``markerscope``: ``python3 tools/links.py`` writes ``.links/`` beside them.
 
-``.links/markerscope/`` holds the package's ``__init__.py`` and a link to each folder (a junction on Windows), so that
+``.links/markerscope/`` holds the package's own files and a link to each folder (a junction on Windows), so that
 with ``.links`` on the path Python, mypy and editors find what the wheel would hold, and nothing else: no folder of the
 working directory, however it is called, comes between. The set-up connects its environment by a ``.pth`` file; another
 working tree uses the same environment with ``PYTHONPATH=.links``, which goes before it. Standard library alone.
@@ -17,6 +17,8 @@ from pathlib import Path
 
 PARTS = ("app", "solver", "widgets", "resources")
 """The folders that are installed."""
+OWN = ("__init__.py", "py.typed")
+"""The files of the package itself, in ``package/``."""
 
 
 def write_links(root: Path) -> Path:
@@ -24,15 +26,16 @@ def write_links(root: Path) -> Path:
     folder = root / ".links"
     package = folder / "markerscope"
     package.mkdir(parents=True, exist_ok=True)
-    init, wanted = package / "__init__.py", (root / "package" / "__init__.py").read_bytes()
-    if not init.exists() or init.read_bytes() != wanted:
-        _move_in(init, lambda new: new.write_bytes(wanted))
+    for name in OWN:
+        file, wanted = package / name, (root / "package" / name).read_bytes()
+        if not file.exists() or file.read_bytes() != wanted:
+            _move_in(file, lambda new, wanted=wanted: new.write_bytes(wanted))
     for part in PARTS:
         link, target = package / part, root / part
         if not _leads_to(link, target):
             _move_in(link, lambda new, target=target: _link(new, target))
     for other in package.iterdir():
-        if other.name not in (*PARTS, "__init__.py", "__pycache__") and not other.name.startswith("."):
+        if other.name not in (*PARTS, *OWN, "__pycache__") and not other.name.startswith("."):
             _remove(other)
     return folder
 

@@ -1,0 +1,1 @@
+"""What scripts and notebooks use, as ``import markerscope as ms``: the public names, and nothing else."""
