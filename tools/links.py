@@ -17,8 +17,6 @@ from pathlib import Path
 
 PARTS = ("app", "solver", "widgets", "resources")
 """The folders that are installed."""
-OWN = ("__init__.py", "py.typed")
-"""The files of the package itself, in ``package/``."""
 
 
 def write_links(root: Path) -> Path:
@@ -26,7 +24,8 @@ def write_links(root: Path) -> Path:
     folder = root / ".links"
     package = folder / "markerscope"
     package.mkdir(parents=True, exist_ok=True)
-    for name in OWN:
+    own = {path.name for path in (root / "package").iterdir() if path.is_file()}
+    for name in own:
         file, wanted = package / name, (root / "package" / name).read_bytes()
         if not file.exists() or file.read_bytes() != wanted:
             _move_in(file, lambda new, wanted=wanted: new.write_bytes(wanted))
@@ -35,7 +34,7 @@ def write_links(root: Path) -> Path:
         if not _leads_to(link, target):
             _move_in(link, lambda new, target=target: _link(new, target))
     for other in package.iterdir():
-        if other.name not in (*PARTS, *OWN, "__pycache__") and not other.name.startswith("."):
+        if other.name not in (*PARTS, *own, "__pycache__") and not other.name.startswith("."):
             _remove(other)
     return folder
 

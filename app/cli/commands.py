@@ -247,6 +247,9 @@ def run_cycles(options: argparse.Namespace, services: Services) -> int:
     """``markerscope cycles``."""
     with Terminal(options) as terminal:
         terminal.show(services.cycles(cycles_request(options), terminal.progress))
+    return 0
+
+
 def run_label(options: argparse.Namespace, services: Services) -> int:
     """``markerscope label``."""
     with Terminal(options) as terminal:

@@ -134,7 +134,7 @@ class Result:
         motion = self.stage(FIT)
         none = np.zeros(motion.joints.shape[:2], dtype=bool)
         bones = tuple(BONES[joint] for joint in JOINTS)
-        return Points(motion.time, JOINTS, motion.joints, self.stage(CLEAN).markers.rate, none, bones)
+        return Points(motion.time, tuple(JOINTS), motion.joints, self.stage(CLEAN).markers.rate, none, bones)
 
     @cached_property
     def body(self) -> PosedBody:
@@ -142,12 +142,12 @@ class Result:
         motion, file = self.stage(FIT), self._session.inputs.get("body_file")
         model = load_body(file.path if file else None)
         return PosedBody(
-            motion.time, motion.rotations, motion.trans, motion.betas, motion.joints, JOINTS, model.faces, model
+            motion.time, motion.rotations, motion.trans, motion.betas, motion.joints, tuple(JOINTS), model.faces, model
         )
 
     @property
     def confidence(self) -> float:
-        """0..1, how likely the markers are on the right bones and the body the right way round, for all that is known."""
+        """0..1, how likely the markers are on the right bones and the body faces the right way."""
         return float(self.stage(CHECK).confidence)
 
     @property
@@ -188,7 +188,9 @@ def _reader(session: Session, keys: Mapping[str, str]) -> Any:
             try:
                 known[stage] = session.store.get(stage, keys[stage], result_type(stage))
             except Absent as error:
-                raise InputError(f"has lost its result of the stage {stage}", session.folder, "solve it again") from error
+                raise InputError(
+                    f"has lost its result of the stage {stage}", session.folder, "solve it again"
+                ) from error
         return known[stage]
 
     return read

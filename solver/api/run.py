@@ -185,7 +185,11 @@ def solve(
 
 
 def evaluate(
-    result: Result | FileName, reference: Result | FileName, *, body: FileName | None = None, progress: Progress = silent
+    result: Result | FileName,
+    reference: Result | FileName,
+    *,
+    body: FileName | None = None,
+    progress: Progress = silent,
 ) -> Mapping[str, Any]:
     """How far a result is from a reference: joint, velocity and skin errors, and each angle's difference.
 
@@ -212,7 +216,12 @@ def evaluate(
 
 
 def simulate(
-    motion: FileName = "walk", *, out: FileName | None = None, seed: int = 0, progress: Progress = silent, **settings: Any
+    motion: FileName = "walk",
+    *,
+    out: FileName | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+    **settings: Any,
 ) -> SynthSession:
     """A synthetic session whose truth is known.
 

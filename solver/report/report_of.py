@@ -94,7 +94,9 @@ def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str,
     return ReportData(
         title=marker_file.stem,
         subtitle=f"{part}, {len(motion.time)} frames at {markers.rate:g} Hz{stands_on}",
-        headlines=headlines(None if "known" in graph.keys else graph[SYNC], ranked, motion, graph[SURFACE], graph[CHECK], pinned),
+        headlines=headlines(
+            None if "known" in graph.keys else graph[SYNC], ranked, motion, graph[SURFACE], graph[CHECK], pinned
+        ),
         warnings=doubts(graph),
         inputs=inputs,
         groups=_groups(markers, graph[SEGMENT]),

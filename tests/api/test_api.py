@@ -59,7 +59,9 @@ def test_the_tables_hold_what_the_files_hold(result: ms.Result, session: tuple[P
     assert lines[0].split(",")[1:] == list(result.angles.names)
     written = np.array([[float(cell or "nan") for cell in line.split(",")] for line in lines[1:]])
     assert np.allclose(written[:, 1:], result.angles.degrees, atol=1e-4, equal_nan=True)
-    assert np.array_equal(result.angles["knee_angle_r"], result.angles.degrees[:, result.angles.names.index("knee_angle_r")])
+    assert np.array_equal(
+        result.angles["knee_angle_r"], result.angles.degrees[:, result.angles.names.index("knee_angle_r")]
+    )
     made = session[1].markers
     assert result.markers.names == made.labels
     measured = np.isfinite(made.positions).all(axis=2) & ~result.markers.filled
