@@ -15,9 +15,11 @@ import numpy as np
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.core.progress import Progress, part_of, silent
 from markerscope.solver.core.request import Method, SolveOutcome, SolveRequest
+from markerscope.solver.core.skeleton import JOINTS
 from markerscope.solver.fit.doubts.doubt import Doubt
 from markerscope.solver.fit.pull.results import summary as summary_of_pull
 from markerscope.solver.fit.results import Candidate
+from markerscope.solver.fit.second.results import LimbAnswer
 from markerscope.solver.io.camera import camera_file
 from markerscope.solver.io.output_folder import remove_if_empty
 from markerscope.solver.pipeline.cleaning import BY_FRAME
@@ -325,6 +327,7 @@ def _outcome(session: Session, graph: GraphRun, not_kept: tuple[str, ...] = ()) 
         "doubts": [_doubt(doubt, markers.labels) for doubt in found.doubts],
         "nobodys_markers": [markers.labels[m] for m in found.nobody],
         "suspect_markers": [markers.labels[m] for m in found.suspect],
+        "second_answers": [_second(answer) for answer in motion.second],
         "landmark_pull": None if motion.pull is None else summary_of_pull(motion.pull, markers.labels),
     }
     said, doubted = (*assumptions(graph), *not_kept), doubts(graph)
@@ -345,6 +348,18 @@ def _doubt(doubt: Doubt, labels: tuple[str, ...]) -> dict[str, Any]:
         "markers": [labels[m] for m in doubt.markers],
         "value": doubt.value if np.isfinite(doubt.value) else None,
         "limit": doubt.limit if np.isfinite(doubt.limit) else None,
+    }
+
+
+def _second(answer: LimbAnswer) -> dict[str, Any]:
+    """Another answer for a limb in plain JSON values."""
+    return {
+        "limb": answer.limb,
+        "joint": JOINTS[answer.joint],
+        "joint_apart_mm": 1000 * answer.apart,
+        "turn_deg": answer.turn_deg,
+        "confidence_in_the_first": answer.confidence,
+        "chosen": answer.chosen,
     }
 
 

@@ -142,9 +142,11 @@ def test_an_answer_that_costs_hardly_more_is_told_and_can_be_taken(free_body: Bo
     first, second = (forward(free_body, found.state.pose).place[:, other.joint] for found in (searched, taken))
     assert np.linalg.norm(first - second, axis=1).mean() > 0.7 * other.apart
     assert taken.others[0].chosen and "by hand" in taken.others[0].sentence
-    (doubt, *_) = second_answers(sound(second=searched.others))
-    assert doubt.kind == "second answer" and doubt.sentence == other.sentence
-    assert verdict(sound(second=searched.others), 0.97).confidence == 0.97, "of one limb, not of the whole"
+    near, surer = replace(other, confidence=0.59), replace(other, confidence=0.61)
+    (doubt,) = second_answers(sound(second=(near, surer)))
+    assert doubt.kind == "second answer" and doubt.sentence == near.sentence
+    assert second_answers(sound(second=(replace(surer, chosen=True),))), "what was chosen by hand is said"
+    assert verdict(sound(second=(near,)), 0.97).confidence == 0.97, "of one limb, not of the whole"
 
 
 def test_what_is_near_the_answer_or_dear_is_no_other(free_body: Body) -> None:

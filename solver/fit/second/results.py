@@ -40,8 +40,8 @@ class LimbAnswer:
     confidence: float
     chosen: bool = False
 
-    LEAST_SURE: ClassVar[float] = 0.832
-    """What an answer has whose excess is the greatest that is told."""
+    LEAST_SURE: ClassVar[float] = 0.6
+    """An answer with less is doubted; with more, the second one is only listed."""
 
     @property
     def sentence(self) -> str:
