@@ -30,6 +30,7 @@ ROOMS = (
     "solver.fit",
     "solver.fit.labelled",
     "solver.fit.known",
+    "solver.fit.standard_errors",
     "solver.fit.published",
     "solver.neural",
     "solver.neural.training",

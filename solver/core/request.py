@@ -49,6 +49,7 @@ class SolveRequest:
     neutral : what the angles are counted from: a span (start, stop) s of the trial, either may be None, the file of a
         static trial of the same person, or "recorded" for the convention's own zero
     landmark_pull : whether markers are drawn to bony landmarks where their layout has earned it
+    standard_errors : whether ``angles.csv`` has a column of standard errors beside each angle
     """
 
     markers: Path
@@ -72,6 +73,7 @@ class SolveRequest:
     convention: Convention | None = None
     neutral: tuple[float | None, float | None] | Path | Literal["recorded"] | None = None
     landmark_pull: LandmarkPull | None = None
+    standard_errors: bool | None = None
 
     def __post_init__(self) -> None:
         """Refuse values that no data can make sense of."""

@@ -39,7 +39,7 @@ from tests.fit.conftest import simulate
 from tests.synthetic import Recording, record, session
 
 TINY = {"localize": {"yaws": 6, "few": 4, "many": 6, "keep": 3}, "orient": {"refine": 2}}
-FITTED = {"localize", "orient", "fit", "neutral", "angles", "surface", "check"}
+FITTED = {"localize", "orient", "fit", "neutral", "angles", "errors", "surface", "check"}
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def edited(folder: Path, edits: Mapping[str, Mapping[str, Any]]) -> SolveRequest
         ("segment", "threshold", 0.01, {"segment"} | FITTED),
         ("localize", "keep", 5, FITTED),
         ("orient", "offset_mm", 12.0, FITTED - {"localize"}),
-        ("fit", "candidate", 1, {"fit", "neutral", "angles", "surface", "check"}),
+        ("fit", "candidate", 1, {"fit", "neutral", "angles", "errors", "surface", "check"}),
         ("angles", "convention", "isb", {"angles"}),
     ],
 )
@@ -197,7 +197,7 @@ def test_a_method_that_draws_no_markers_says_so(mine: Path) -> None:
 def test_a_pinned_candidate_is_used_and_can_be_let_go(mine: Path) -> None:
     first = content(mine)
     outcome = solve_session(edited(mine, {"fit": {"candidate": 1}}), silent)
-    assert set(outcome.summary["computed"]) == {"fit", "neutral", "angles", "surface", "check"}
+    assert set(outcome.summary["computed"]) == {"fit", "neutral", "angles", "errors", "surface", "check"}
     assert any("pinned by hand" in warning for warning in outcome.warnings)
     assert outcome.summary["confidence"] < 1, "a decision by hand is no evidence"
     assert json.loads((mine / "angles.json").read_text())["edits"] == {"fit": {"candidate": 1}}
