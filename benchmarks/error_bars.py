@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +28,13 @@ from markerscope.solver.bench.motions import read_source
 from markerscope.solver.body.bones import load_body
 from markerscope.solver.core.errors import InputError
 from markerscope.solver.fit import method
+from markerscope.solver.fit.kinematics import Points
 from markerscope.solver.fit.observe import observe
+from markerscope.solver.fit.results import FittedMotion
 from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
 from markerscope.solver.fit.standard_errors.calibrated import FACTORS
 from markerscope.solver.fit.standard_errors.propagate import standard_errors
+from markerscope.solver.fit.state import Observations
 from markerscope.solver.synth.session import SynthSession, synthesise
 from markerscope.solver.synth.settings import SynthSettings
 
@@ -60,16 +63,33 @@ def drawn(number: int) -> tuple[str, SynthSession]:
     return group, synthesise(read_source(sources[number * 7 % len(sources)]), settings, 50_000 + number)
 
 
-def solved(number: int) -> dict[str, Any]:
-    """Errors and standard errors of a session's angles, every fifth frame."""
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A session, its group, what the fit used of it, and the fit."""
+
+    group: str
+    session: SynthSession
+    used: Observations
+    points: Points
+    motion: FittedMotion
+
+
+def fitted(number: int) -> Fitted:
+    """The session of a number, solved."""
     group, session = drawn(number)
-    body, truth, settings = load_body(), session.truth, AngleSettings()
+    body, truth = load_body(), session.truth
     seen, points = observe(session.markers, session.prior, None, body, truth.offset, 1.0)
     left_out = np.zeros(len(session.markers.labels), bool)
     found = method.localize(body, seen, left_out, LocalizeSettings())
     ranked = method.orient(body, seen, points, found, OrientSettings())
     motion = method.fit(body, seen, points, found, ranked, session.markers.time, FitSettings())
-    used = method.in_use(seen, found, ranked)
+    return Fitted(group, session, method.in_use(seen, found, ranked), points, motion)
+
+
+def errors_and_bars(fit: Fitted) -> dict[str, Any]:
+    """Errors and standard errors of a session's angles, these before ``FACTORS``, every fifth frame."""
+    session, motion, body, settings = fit.session, fit.motion, load_body(), AngleSettings()
+    truth = session.truth
     ours = joint_angles(
         motion.time, motion.rotations, body.landmarks(motion.betas), body.joints(motion.betas), settings
     )
@@ -81,18 +101,19 @@ def solved(number: int) -> dict[str, Any]:
         settings,
     )
     singular = ours.singular | theirs.singular
-    bars = standard_errors(body, used, points, motion, settings, singular=singular)
+    bars = standard_errors(body, fit.used, fit.points, motion, settings, singular=singular)
     level = np.sqrt(np.maximum(bars.level**2 - bars.definition**2, 0))
     right = right_part(motion.marker_joint, truth.marker_joint, session.settings.part)
     right &= heading_error_deg(motion.rotations[:, 0], truth.motion.rotations[:, 0]) < 45
     grounds = evidence(settings.convention, motion.marker_joint)
+    factor = np.array([FACTORS[grounds[name]] for name in ours.names])
     return {
-        "about": json.dumps({"group": group, "right": bool(right), "confidence": float(motion.confidence)}),
+        "about": json.dumps({"group": fit.group, "right": bool(right), "confidence": float(motion.confidence)}),
         "names": np.array(ours.names),
         "grounds": np.array([grounds[name] for name in ours.names]),
         "error": (((ours.degrees - theirs.degrees + 180) % 360) - 180)[::_EVERY].astype(np.float32),
-        "shape": bars.shape[::_EVERY],
-        "level": level[::_EVERY].astype(np.float32),
+        "shape": (bars.shape / factor[:, 0])[::_EVERY].astype(np.float32),
+        "level": (level / factor[:, 1])[::_EVERY].astype(np.float32),
     }
 
 
@@ -104,7 +125,7 @@ def draw(folder: Path, first: int, count: int) -> None:
         if path.exists():
             continue
         try:
-            np.savez_compressed(path, **solved(number))
+            np.savez_compressed(path, **errors_and_bars(fitted(number)))
         except InputError as error:
             print(f"{number}: {error}", file=sys.stderr)
         print(f"{number} done", flush=True)
@@ -123,7 +144,10 @@ def curves(folder: Path) -> list[dict[str, Any]]:
                 if known.sum() >= 10:
                     found.append(
                         {"group": about["group"], "ground": str(ground), "name": str(data["names"][i])}
-                        | {k: data[k][known, i].astype(float) for k in ("error", "shape", "level")}
+                        | {
+                            k: data[k][known, i].astype(float) * factor
+                            for k, factor in zip(("error", "shape", "level"), (1.0, *FACTORS[str(ground)]))
+                        }
                     )
     return found
 

@@ -243,6 +243,7 @@ class Column:
 
 
 def columns_of(convention: str) -> Iterator[Column]:
+    """Every angle of a convention, in the order of the files."""
     about = conventions()[convention]
     for joint, row in about["joints"].items():
         axes = np.array(row["axes"]) if "axes" in row else None

@@ -8,7 +8,7 @@ import numpy as np
 
 from markerscope.solver.angles.angles import AngleSettings, columns_of, conventions, lab_axes
 from markerscope.solver.angles.cardan import about_axes, cardan
-from markerscope.solver.core.rotations import exp_so3
+from markerscope.solver.core.rotations import exp_so3, log_so3, right_jacobian_inverse
 
 _MIRROR = np.array([1.0, 1, -1])
 _FLAT = 1e-3
@@ -68,10 +68,19 @@ def _by_sequence(relative: np.ndarray, sequence: str, ranges: np.ndarray, place:
 
 
 def _by_axes(relative: np.ndarray, axes: np.ndarray, place: int) -> np.ndarray:
-    """(T, 3) derivative of one of two angles about given axes, the third turn being what is left over."""
+    """(T, 3) derivative of one of two angles about given axes.
+
+    What the two turns leave over, m = log(S^T R), is square to both of them: ``J^T m = 0`` with J the axes in the distal
+    frame. Its derivative is that of the angles, by the implicit function theorem.
+    """
     angles = np.radians(about_axes(relative, axes)[0])
     first, second = axes / np.linalg.norm(axes, axis=1, keepdims=True)
-    moved = exp_so3(angles[:, :1] * first) @ second
-    pair = np.stack([np.broadcast_to(first, moved.shape), moved], axis=2)
-    normal = np.swapaxes(pair, 1, 2)
-    return np.asarray(np.linalg.solve(normal @ pair, normal)[:, place])
+    back = np.swapaxes(exp_so3(angles[:, 1:] * second), 1, 2)
+    carried = back @ first
+    missing = log_so3(back @ np.swapaxes(exp_so3(angles[:, :1] * first), 1, 2) @ relative)
+    pair = np.stack([carried, np.broadcast_to(second, carried.shape)], axis=2)
+    across, right = np.swapaxes(pair, 1, 2), right_jacobian_inverse(missing)
+    by_angles = -across @ np.swapaxes(right, 1, 2) @ pair
+    by_angles[:, 0, 1] += np.einsum("ti,ti->t", np.cross(carried, second), missing)
+    by_turn = across @ right @ np.swapaxes(relative, 1, 2)
+    return np.asarray(-np.linalg.solve(by_angles, by_turn)[:, place])

@@ -78,7 +78,7 @@ def standard_error(errors: AngleErrors, name: str) -> dict[str, float | None]:
 
 
 def noise_of(errors: AngleErrors) -> dict[str, float | None]:
-    """The noise a coordinate that the session showed: of markers (mm), of the video's joints (degrees) and landmarks."""
+    """The noise a coordinate that the session showed: of markers, mm, of the video's joints, degrees, and landmarks."""
     return {name: _rounded(getattr(errors, name), 4) for name in ("marker_mm", "video_deg", "image_share")}
 
 

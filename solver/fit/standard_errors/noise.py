@@ -54,8 +54,8 @@ def found_noise(problem: Problem, at: Estimate, whole: NormalEquations, parts: M
     whole, parts : the normal equations at the keyframes, of all terms and of each
     """
     inverse = np.linalg.inv(whole.h_ff)
-    shape: dict[str, float] = {name: 1.0 for name in parts}
-    level: dict[str, float] = {name: 0.0 for name in parts}
+    shape: dict[str, float] = dict.fromkeys(parts, 1.0)
+    level: dict[str, float] = dict.fromkeys(parts, 0.0)
     frames = at.frames
     marker = video = image = float("nan")
     for term in problem.terms:

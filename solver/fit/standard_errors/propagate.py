@@ -1,8 +1,8 @@
 """Standard errors of every angle in every frame: the fit's Gauss-Newton matrices carried over to the angles.
 
 With H the fit's matrix and M the same sum of terms, each times the variance that its residuals show over the one that
-its weight assumes, the estimate errs by ``H^-1 M H^-1`` (the sandwich of Huber 1967): true where a weight was chosen for
-robustness and not for truth. Frames are eliminated as in the fit (Schur complement), and priors that hold once are
+its weight assumes, the estimate errs by ``H^-1 M H^-1`` (the sandwich of Huber 1967): true where a weight was chosen
+for robustness and not for truth. Frames are eliminated as in the fit (Schur complement), and priors that hold once are
 counted once.
 """
 
