@@ -32,7 +32,7 @@ from markerscope.solver.fit.kinematics import Points
 from markerscope.solver.fit.observe import observe
 from markerscope.solver.fit.results import FittedMotion
 from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
-from markerscope.solver.fit.standard_errors.calibrated import FACTORS
+from markerscope.solver.fit.standard_errors.calibrated import USUAL_MARKER_MM, USUAL_VIDEO_DEG, factors
 from markerscope.solver.fit.standard_errors.propagate import standard_errors
 from markerscope.solver.fit.state import Observations
 from markerscope.solver.synth.session import SynthSession, synthesise
@@ -87,7 +87,7 @@ def fitted(number: int) -> Fitted:
 
 
 def errors_and_bars(fit: Fitted) -> dict[str, Any]:
-    """Errors and standard errors of a session's angles, these before ``FACTORS``, every fifth frame."""
+    """Errors and standard errors of a session's angles, these before they are multiplied, every fifth frame."""
     session, motion, body, settings = fit.session, fit.motion, load_body(), AngleSettings()
     truth = session.truth
     ours = joint_angles(
@@ -106,9 +106,11 @@ def errors_and_bars(fit: Fitted) -> dict[str, Any]:
     right = right_part(motion.marker_joint, truth.marker_joint, session.settings.part)
     right &= heading_error_deg(motion.rotations[:, 0], truth.motion.rotations[:, 0]) < 45
     grounds = evidence(settings.convention, motion.marker_joint)
-    factor = np.array([FACTORS[grounds[name]] for name in ours.names])
+    factor = np.array([factors(grounds[name], bars.video_deg, bars.marker_mm) for name in ours.names])
     return {
-        "about": json.dumps({"group": fit.group, "right": bool(right), "confidence": float(motion.confidence)}),
+        "about": json.dumps(
+            {"group": fit.group, "right": bool(right), "video": bars.video_deg, "marker": bars.marker_mm}
+        ),
         "names": np.array(ours.names),
         "grounds": np.array([grounds[name] for name in ours.names]),
         "error": (((ours.degrees - theirs.degrees + 180) % 360) - 180)[::_EVERY].astype(np.float32),
@@ -131,8 +133,8 @@ def draw(folder: Path, first: int, count: int) -> None:
         print(f"{number} done", flush=True)
 
 
-def curves(folder: Path) -> list[dict[str, Any]]:
-    """Every curve of the sessions solved on the right part and the right way round."""
+def curves(folder: Path, *, raw: bool = False) -> list[dict[str, Any]]:
+    """Every curve of the sessions solved on the right part and the right way round; ``raw``: before calibration."""
     found = []
     for path in sorted(folder.glob("*.npz")):
         with np.load(path) as data:
@@ -141,31 +143,40 @@ def curves(folder: Path) -> list[dict[str, Any]]:
                 continue
             for i, ground in enumerate(data["grounds"]):
                 known = np.isfinite(data["shape"][:, i])
-                if known.sum() >= 10:
-                    found.append(
-                        {"group": about["group"], "ground": str(ground), "name": str(data["names"][i])}
-                        | {
-                            k: data[k][known, i].astype(float) * factor
-                            for k, factor in zip(("error", "shape", "level"), (1.0, *FACTORS[str(ground)]))
-                        }
-                    )
+                if known.sum() < 10:
+                    continue
+                times = (1.0, 1.0) if raw else factors(str(ground), about["video"], about["marker"])
+                row = {"ground": str(ground), "name": str(data["names"][i]), **about}
+                for name, factor in zip(("error", "shape", "level"), (1.0, *times)):
+                    row[name] = data[name][known, i].astype(float) * factor
+                found.append(row)
     return found
 
 
 def calibrate(folder: Path) -> None:
-    """Print the factors: of shape, where the spread about the mean is as said; of level, where 68 % are covered."""
-    rows = curves(folder)
+    """Print the powers of the noise by which errors grow beyond the linear theory, and then the factors.
+
+    Powers: least squares of the logarithm of each curve's error over its standard error. Factors: of shape, where the
+    spread about the mean is as said; of level, where 68.5 % of the frames are covered.
+    """
+    rows = curves(folder, raw=True)
+    noise = np.log([[row["video"] / USUAL_VIDEO_DEG, row["marker"] / USUAL_MARKER_MM] for row in rows])
+    grounds = np.array([[row["ground"] == ground for ground in GROUNDS] for row in rows], float)
+    off = [np.sqrt((row["error"] ** 2).mean() / (row["shape"] ** 2 + row["level"] ** 2).mean()) for row in rows]
+    powers = np.linalg.lstsq(np.concatenate([noise, grounds], axis=1), np.log(off), rcond=None)[0][:2]
+    powers = np.maximum(powers, 0)
+    print(f"powers: ({powers[0]:.2f}, {powers[1]:.2f})")
+    for row, times in zip(rows, np.exp(noise @ powers)):
+        row["shape"], row["level"] = row["shape"] * times, row["level"] * times
     for ground in GROUNDS:
         mine = [row for row in rows if row["ground"] == ground]
-        ratio = [row["error"].std() / np.sqrt((row["shape"] ** 2).mean()) for row in mine]
-        shape = float(np.quantile(ratio, 0.6))
+        shape = float(np.quantile([row["error"].std() / np.sqrt((row["shape"] ** 2).mean()) for row in mine], 0.6))
         low, high = 0.05, 8.0
         for _ in range(30):
             factor = np.sqrt(low * high)
             inside = np.mean([covered(row, 1.0, shape, factor) for row in mine])
             low, high = (factor, high) if inside < 0.685 else (low, factor)
-        old = FACTORS[ground]
-        print(f"{ground}: ({old[0] * shape:.2f}, {old[1] * factor:.2f}) from {len(mine)} curves")
+        print(f"{ground}: ({shape:.2f}, {factor:.2f}) from {len(mine)} curves")
 
 
 def covered(row: dict[str, Any], times: float, shape: float = 1.0, level: float = 1.0) -> float:

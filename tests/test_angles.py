@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from markerscope.solver.angles.angles import AngleSettings, _columns, conventions, evidence, joint_angles, read_angles
+from markerscope.solver.angles.angles import AngleSettings, columns_of, conventions, evidence, joint_angles, read_angles
 from markerscope.solver.body.anatomy import MODEL_HUMERUS, MODEL_THORAX
 from markerscope.solver.body.model import Body
 from markerscope.solver.core.angle_table import JointAngles
@@ -446,14 +446,14 @@ def test_unmirrored_left_sides_have_mirrored_ranges() -> None:
     found = angles_of("visual3d", **high)
     assert [found["RHIP_ANGLE_Y"], found["LHIP_ANGLE_Y"]] == pytest.approx([-110, 110])
     assert [found["RHIP_ANGLE_X"], found["LHIP_ANGLE_X"]] == pytest.approx([0, 0], abs=1e-6)
-    ranges = {column.name: column.ranges for column in _columns("visual3d")}
+    ranges = {column.name: column.ranges for column in columns_of("visual3d")}
     right, left = ranges["RHIP_ANGLE_Y"], ranges["LHIP_ANGLE_Y"]
     assert right.tolist() == [[-40, 150], [-120, 60], [-90, 90]] and left.tolist() == [
         [-40, 150],
         [-60, 120],
         [-90, 90],
     ]
-    mirrored = {column.name: column.ranges for column in _columns("isb")}
+    mirrored = {column.name: column.ranges for column in columns_of("isb")}
     assert np.array_equal(mirrored["hip_adduction_r"], mirrored["hip_adduction_l"]), "mirrored before it is read"
 
 

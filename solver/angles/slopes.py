@@ -70,8 +70,8 @@ def _by_sequence(relative: np.ndarray, sequence: str, ranges: np.ndarray, place:
 def _by_axes(relative: np.ndarray, axes: np.ndarray, place: int) -> np.ndarray:
     """(T, 3) derivative of one of two angles about given axes.
 
-    What the two turns leave over, m = log(S^T R), is square to both of them: ``J^T m = 0`` with J the axes in the distal
-    frame. Its derivative is that of the angles, by the implicit function theorem.
+    What the two turns leave over, m = log(S^T R), is square to both of them: ``J^T m = 0`` with J the axes in the
+    distal frame. Its derivative is that of the angles, by the implicit function theorem.
     """
     angles = np.radians(about_axes(relative, axes)[0])
     first, second = axes / np.linalg.norm(axes, axis=1, keepdims=True)

@@ -19,8 +19,10 @@ class AngleErrors:
         error, and how much the anatomical frames differ between definitions
     definition : (A,) degrees, the last of these alone, root mean square over frames
     marker_mm, video_deg, image_share : noise a coordinate that was found in this session, NaN where there is none: of
-        markers, of the video's joint rotations, of its landmarks as a share of the person's height
-    NaN in ``shape`` and ``level`` where the angle is not defined
+        markers, of the video's joint rotations (its constant error included), of its landmarks as a share of the
+        person's height
+
+    NaN in ``shape`` and ``level`` where the angle is not defined.
     """
 
     names: tuple[str, ...]

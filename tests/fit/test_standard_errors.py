@@ -23,6 +23,7 @@ from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.results import FittedMotion, Solution
 from markerscope.solver.fit.settings import FitSettings
 from markerscope.solver.fit.standard_errors import propagate
+from markerscope.solver.fit.standard_errors.calibrated import FACTORS, factors
 from markerscope.solver.fit.standard_errors.frames import definition_spread, frames_and_slopes
 from markerscope.solver.fit.state import Observations, State
 from tests.fit.conftest import drawn_vertices, simulate
@@ -41,7 +42,7 @@ def solved(
     vertices = drawn_vertices(body, scene.bones, seed)
     if legs:
         bones = [INDEX[f"{side}_{joint}"] for side in ("left", "right") for joint in ("hip", "knee", "ankle")]
-        vertices = vertices[np.isin(body.weights[vertices].argmax(axis=1), bones)]
+        vertices = rng.choice(skin.index[np.isin(body.weights[skin.index].argmax(axis=1), bones)], 30, replace=False)
     placement, surface = skin.on_vertices(vertices, 0.0095)
     markers = place_points(placement, forward(body, pose), pose.betas)
     markers = markers + rng.normal(0, noise, markers.shape)
@@ -125,13 +126,14 @@ def test_the_definitions_that_ship_differ_by_what_the_table_says(free_body: Body
 
 
 def test_a_pose_solved_again_and_again_scatters_as_the_shape_error_says(free_body: Body) -> None:
-    seen, points, motion, pose = solved(free_body, noise=0.003, frames=150, still=True)
+    seen, points, motion, _ = solved(free_body, noise=0.003, frames=150, still=True)
     bars = errors_of(free_body, seen, points, motion)
     body = free_body.landmarks(motion.betas), free_body.joints(motion.betas)
     angles = joint_angles(motion.time, motion.rotations, *body, AngleSettings())
     held = np.arange(len(angles.names))[[n.startswith(("hip", "knee", "lumbar")) for n in angles.names]]
     scatter = angles.degrees[:, held].std(axis=0)
-    told = np.sqrt((bars.shape[:, held] ** 2).mean(axis=0)) / propagate.FACTORS["markers"][0]
+    told = np.sqrt((bars.shape[:, held] ** 2).mean(axis=0))
+    told /= factors("markers", bars.video_deg, bars.marker_mm)[0]
     # The pose of the video is the same in every frame here, so that what moves is the noise of the markers alone.
     assert (scatter < 1.15 * told).all() and np.median(told / scatter) < 1.8
     assert bars.marker_mm == pytest.approx(3.0, rel=0.35)
@@ -150,7 +152,7 @@ def test_what_no_marker_shows_is_said_to_be_unsure(free_body: Body) -> None:
     mean = {name: bars.mean_of(name) for name in bars.names}
     for side in "rl":
         knee, elbow = mean[f"knee_angle_{side}"], mean[f"elbow_flex_{side}"]
-        assert np.hypot(elbow["shape"], elbow["level"]) > 1.3 * np.hypot(knee["shape"], knee["level"])
+        assert np.hypot(elbow["shape"], elbow["level"]) > 1.5 * np.hypot(knee["shape"], knee["level"])
 
 
 def test_a_neutral_pose_takes_the_level_off(free_body: Body) -> None:
@@ -159,8 +161,8 @@ def test_a_neutral_pose_takes_the_level_off(free_body: Body) -> None:
     frame = 4
     zero = errors_of(free_body, seen, points, motion, neutral=motion.rotations[frame])
     # In the neutral frame itself nothing of the level is left but what its own noise leaves.
-    factor = np.array([list(propagate.FACTORS.values())[0][1] / list(propagate.FACTORS.values())[0][0]])
-    assert (zero.level[frame] <= 1.02 * np.maximum(factor, 3) * plain.shape[frame]).all()
+    most = max(level / shape for shape, level in FACTORS.values())
+    assert (zero.level[frame] <= 1.02 * most * plain.shape[frame]).all()
     assert np.nanmedian(zero.level) < 0.75 * np.nanmedian(plain.level)
     assert np.median(zero.definition) < 0.75 * np.median(plain.definition)
 

@@ -64,6 +64,8 @@ def found_noise(problem: Problem, at: Estimate, whole: NormalEquations, parts: M
             marker = at.weights.marker * float(np.sqrt(shape[term.name]))
         elif isinstance(term, VideoPose):
             total, constant = _video(term, at, inverse)
+            if at.weights.free_bias:  # then the bias holds what is constant, and its own spread tells how much
+                constant = 0.0
             shape[term.name], level[term.name] = total * (1 - constant), total * constant
             video = float(np.sqrt(total) * np.mean(at.weights.prior_deg))
         elif isinstance(term, ImageLandmarks) and term.any_seen:

@@ -26,7 +26,7 @@ from markerscope.solver.fit.method import camera_of
 from markerscope.solver.fit.normal import NormalEquations
 from markerscope.solver.fit.problem import Problem, person_height
 from markerscope.solver.fit.results import FittedMotion, Solution
-from markerscope.solver.fit.standard_errors.calibrated import FACTORS
+from markerscope.solver.fit.standard_errors.calibrated import factors
 from markerscope.solver.fit.standard_errors.frames import SegmentFrames, frames_and_slopes
 from markerscope.solver.fit.standard_errors.noise import Noise, found_noise
 from markerscope.solver.fit.state import FREE, POSE_SIZE, Observations, State, Weights
@@ -75,7 +75,7 @@ def standard_errors(
         np.concatenate([getattr(part, name) for part in parts]) for name in ("shape", "level", "definition")
     )
     names = tuple(evidence(settings.convention, motion.marker_joint).items())
-    factor = np.array([FACTORS[ground] for _, ground in names])
+    factor = np.array([factors(ground, noise.video_deg, 1000 * noise.marker_m) for _, ground in names])
     shape, level = np.sqrt(shape) * factor[:, 0], np.sqrt(level) * factor[:, 1]
     shape, level = (np.minimum(np.degrees(value), _UNKNOWN_DEG) for value in (shape, np.hypot(level, definition)))
     known = np.ones(shape.shape, bool) if singular is None else ~singular
@@ -178,6 +178,8 @@ class _Solved:
         parts = self.parts(problem, at)
         whole = _added(parts)
         noise = found_noise(problem, at, whole, parts)
+        if self.weights.free_bias:
+            noise = replace(noise, video_deg=float(np.hypot(noise.video_deg, self.weights.bias_deg)))
         free, bias = self.free, problem.unknowns.bias
         once = np.zeros_like(whole.h_ss)
         if self.weights.free_bias:  # the video's bias is believed small once, beside what every frame says of it
