@@ -3,11 +3,14 @@
     python -m benchmarks.error_bars draw FOLDER --first 0 --count 60
     python -m benchmarks.error_bars calibrate FOLDER
     python -m benchmarks.error_bars judge FOLDER
+    python -m benchmarks.error_bars real DATA
 
 ``draw`` makes sessions, solves them and leaves errors and standard errors in FOLDER; a session that is there is not
 drawn again. ``calibrate`` prints the factors that make them cover what they should; ``judge`` prints Markdown tables.
 Calibrate on other numbers than are judged. Angles of truth and solution are read off by one convention, so the spread
 of definitions does not enter and is taken out of the standard errors.
+``real`` solves the recording of ``benchmarks.squat`` as it is and from the pose of its first second, and compares with
+the inverse kinematics of its labelled markers, which have errors of their own.
 """
 
 from __future__ import annotations
@@ -15,18 +18,22 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.squat import PARTS, stripped
 from benchmarks.trap_sessions import FRAMES, movements
 from markerscope.solver.angles.angles import AngleSettings, evidence, joint_angles
 from markerscope.solver.bench.measure import heading_error_deg, right_part
 from markerscope.solver.bench.motions import read_source
 from markerscope.solver.body.bones import load_body
+from markerscope.solver.commands import solve_session
 from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.request import SolveRequest
 from markerscope.solver.fit import method
 from markerscope.solver.fit.kinematics import Points
 from markerscope.solver.fit.observe import observe
@@ -35,13 +42,15 @@ from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, Orien
 from markerscope.solver.fit.standard_errors.calibrated import USUAL_MARKER_MM, USUAL_VIDEO_DEG, factors
 from markerscope.solver.fit.standard_errors.propagate import standard_errors
 from markerscope.solver.fit.state import Observations
+from markerscope.solver.io.export_trc import write_trc
+from markerscope.solver.io.mot import read_mot
 from markerscope.solver.synth.session import SynthSession, synthesise
-from markerscope.solver.synth.settings import SynthSettings
+from markerscope.solver.synth.settings import Layout, SynthSettings
 
 GROUPS = ("full body", "part of the body", "video x3", "soft tissue x3", "other bodies")
 GROUNDS = ("markers", "one segment", "video only")
 _PARTS = ("left_leg", "right_leg", "left_arm", "right_arm")
-_LAYOUTS = ("plug_in_gait", "ior", "cast", "uniform")
+_LAYOUTS: tuple[Layout, ...] = ("plug_in_gait", "ior", "cast", "uniform")
 _EVERY = 5
 _LARGE_DEG = 8.0
 
@@ -215,10 +224,46 @@ def _line(name: str, rows: list[dict[str, Any]]) -> str:
     return f"| {name} | {len(rows)} | {once:.0f} % | {twice:.0f} % | {auc} | {rank} |"
 
 
+def real(data: Path) -> None:
+    """Print how often the angles of a real recording lie within their standard errors of a reference."""
+    print("| real recording | rests on | angles | within 1 | within 2 |\n|---|---|---|---|---|", flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        for part in PARTS:
+            path = Path(folder) / f"{part}.trc"
+            write_trc(path, stripped(data, part, 1)[0])
+            for name, span in (("as recorded", None), ("from the first second", (0.0, 1.0))):
+                out = Path(folder) / part / name
+                request = SolveRequest(
+                    path, video=data / "squat_video" / "video.mp4", out=out, neutral=span, standard_errors=True
+                )
+                solve_session(request)
+                table = np.genfromtxt(out / "angles.csv", delimiter=",", names=True)
+                about = {row["column"]: row for row in json.loads((out / "angles.json").read_text())["angles"]}
+                reference = read_mot(data / "squat_video" / "squats1_ik.mot")
+                true = reference.in_degrees()
+                for ground in GROUNDS:
+                    inside = []
+                    for angle in (a for a in about if a in true and about[a]["evidence"] == ground):
+                        theirs = np.interp(table["time"], reference.time, true[angle])
+                        if span is not None:
+                            theirs = theirs - theirs[table["time"] - table["time"][0] <= span[1]].mean()
+                        if angle.startswith("pelvis"):
+                            continue  # the reference's lab is turned
+                        off = np.abs(table[angle] - theirs) / table[f"{angle}_se"]
+                        inside.append([np.nanmean(off <= times) for times in (1.0, 2.0)])
+                    if inside:
+                        once, twice = 100 * np.mean(inside, axis=0)
+                        print(
+                            f"| {part.replace('_', ' ')}, {name} | {ground} | {len(inside)} | {once:.0f} % "
+                            f"| {twice:.0f} % |",
+                            flush=True,
+                        )
+
+
 def main() -> int:
     """Do what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("draw", "calibrate", "judge"))
+    parser.add_argument("what", choices=("draw", "calibrate", "judge", "real"))
     parser.add_argument("folder", type=Path)
     parser.add_argument("--first", type=int, default=0, help="number of the first session to draw")
     parser.add_argument("--count", type=int, default=50)
@@ -226,7 +271,7 @@ def main() -> int:
     if options.what == "draw":
         draw(options.folder, options.first, options.count)
     else:
-        (calibrate if options.what == "calibrate" else judge)(options.folder)
+        {"calibrate": calibrate, "judge": judge, "real": real}[options.what](options.folder)
     return 0
 
 

@@ -93,12 +93,11 @@ def test_frames_turn_with_the_shape_as_finite_differences_say(free_body: Body) -
     rng = np.random.default_rng(2)
     betas = rng.normal(0, 0.5, free_body.shape_count)
     for convention in ("opensim", "isb"):
-        found = frames_and_slopes(free_body, betas, AngleSettings(convention))  # type: ignore[arg-type]
+        found = frames_and_slopes(free_body, betas, AngleSettings(convention))
         for k in (0, free_body.shape_count - 1):
             step = 1e-5 * np.eye(free_body.shape_count)[k]
             ahead, behind = (
-                frames_and_slopes(free_body, betas + d, AngleSettings(convention)).frames  # type: ignore[arg-type]
-                for d in (step, -step)
+                frames_and_slopes(free_body, betas + d, AngleSettings(convention)).frames for d in (step, -step)
             )
             for name, slope in found.by_shape.items():
                 turn = log_so3(ahead[name] @ behind[name].T) / 2e-5

@@ -185,8 +185,9 @@ class AnglePlots(QWidget):
                 painter.drawLine(QPointF(area.left(), y.at(0)), QPointF(area.right(), y.at(0)))
             for curve in plot.curves:
                 if curve.band is not None:
+                    below, above = curve.band
                     ground = colour(faded(legible(curve.colour)), _PALER if curve.unmeasured else _PALE)
-                    draw_band(painter, x, y, self._time, *curve.band, ground)
+                    draw_band(painter, x, y, self._time, (below, above), ground)
             for curve in plot.curves:
                 ink = np.array(curve.colour, np.uint8)
                 if curve.reference is not None:

@@ -49,9 +49,10 @@ def draw_curve(
 
 
 def draw_band(
-    painter: QPainter, x: Scale, y: Scale, time: np.ndarray, low: np.ndarray, high: np.ndarray, ground: QColor
+    painter: QPainter, x: Scale, y: Scale, time: np.ndarray, edges: tuple[np.ndarray, np.ndarray], ground: QColor
 ) -> None:
     """An area between two curves (T,), interrupted where they are not finite; as many points as there are pixels."""
+    low, high = edges
     seen = np.flatnonzero((time >= x.low) & (time <= x.high))
     if not len(seen):
         return
