@@ -94,7 +94,7 @@ def edited(folder: Path, edits: Mapping[str, Mapping[str, Any]]) -> SolveRequest
         ("localize", "keep", 5, FITTED),
         ("orient", "offset_mm", 12.0, FITTED - {"localize"}),
         ("fit", "candidate", 1, {"fit", "neutral", "angles", "errors", "surface", "check"}),
-        ("angles", "convention", "isb", {"angles"}),
+        ("angles", "convention", "isb", {"angles", "errors"}),
     ],
 )
 def test_a_setting_changes_what_depends_on_it(stage: str, name: str, value: Any, changed: set[str]) -> None:
@@ -147,7 +147,7 @@ def test_the_second_time_nothing_is_computed_nor_written(mine: Path) -> None:
 
 def test_another_convention_computes_the_angles_alone_and_going_back_nothing(mine: Path) -> None:
     first = (mine / "angles.csv").read_bytes()
-    assert computed(SolveRequest(mine, convention="isb")) == {"angles"}
+    assert computed(SolveRequest(mine, convention="isb")) == {"angles", "errors"}
     assert b"knee_flexion_r" in (mine / "angles.csv").read_bytes()
     assert json.loads((mine / "angles.json").read_text())["convention"] == "isb"
     assert computed(SolveRequest(mine)) == set(), "what was asked for stays in the session"
@@ -306,7 +306,7 @@ def test_outputs_change_all_together_or_not_at_all(mine: Path, monkeypatch: pyte
         solve_session(SolveRequest(mine, convention="isb"), silent)
     after = content(mine)
     assert {name: after[name] for name in before} == before
-    assert {name.split("/")[1] for name in after.keys() - before.keys()} == {"angles"}, "only the finished stage"
+    assert {name.split("/")[1] for name in after.keys() - before.keys()} == {"angles", "errors"}, "only finished stages"
 
 
 @pytest.mark.parametrize("worth", [0.0, 1e9])
