@@ -33,6 +33,7 @@ from markerscope.solver.bench.motions import read_source
 from markerscope.solver.body.bones import load_body
 from markerscope.solver.commands import solve_session
 from markerscope.solver.core.errors import InputError
+from markerscope.solver.core.progress import silent
 from markerscope.solver.core.request import SolveRequest
 from markerscope.solver.fit import method
 from markerscope.solver.fit.kinematics import Points
@@ -236,7 +237,7 @@ def real(data: Path) -> None:
                 request = SolveRequest(
                     path, video=data / "squat_video" / "video.mp4", out=out, neutral=span, standard_errors=True
                 )
-                solve_session(request)
+                solve_session(request, silent)
                 table = np.genfromtxt(out / "angles.csv", delimiter=",", names=True)
                 about = {row["column"]: row for row in json.loads((out / "angles.json").read_text())["angles"]}
                 reference = read_mot(data / "squat_video" / "squats1_ik.mot")
