@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from markerscope.solver.angles.angles import AngleSettings, _columns, conventions, evidence, joint_angles, read_angles
+from markerscope.solver.angles.angles import AngleSettings, columns_of, conventions, evidence, joint_angles, read_angles
 from markerscope.solver.body.anatomy import MODEL_HUMERUS, MODEL_THORAX
 from markerscope.solver.body.model import Body
+from markerscope.solver.core.angle_errors import AngleErrors
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.markers import lab_rotation
 from markerscope.solver.core.skeleton import INDEX, JOINTS, mirror_index
@@ -446,14 +447,14 @@ def test_unmirrored_left_sides_have_mirrored_ranges() -> None:
     found = angles_of("visual3d", **high)
     assert [found["RHIP_ANGLE_Y"], found["LHIP_ANGLE_Y"]] == pytest.approx([-110, 110])
     assert [found["RHIP_ANGLE_X"], found["LHIP_ANGLE_X"]] == pytest.approx([0, 0], abs=1e-6)
-    ranges = {column.name: column.ranges for column in _columns("visual3d")}
+    ranges = {column.name: column.ranges for column in columns_of("visual3d")}
     right, left = ranges["RHIP_ANGLE_Y"], ranges["LHIP_ANGLE_Y"]
     assert right.tolist() == [[-40, 150], [-120, 60], [-90, 90]] and left.tolist() == [
         [-40, 150],
         [-60, 120],
         [-90, 90],
     ]
-    mirrored = {column.name: column.ranges for column in _columns("isb")}
+    mirrored = {column.name: column.ranges for column in columns_of("isb")}
     assert np.array_equal(mirrored["hip_adduction_r"], mirrored["hip_adduction_l"]), "mirrored before it is read"
 
 
@@ -681,6 +682,26 @@ def test_evidence_says_which_segments_carry_markers(tmp_path: Path) -> None:
     write_angles(tmp_path, raised_arm(), {}, found)
     about = json.loads((tmp_path / "angles.json").read_text())
     assert {entry["column"]: entry["evidence"] for entry in about["angles"]} == found
+
+
+def test_standard_errors_stand_in_the_sidecar_and_where_asked_for_in_columns(tmp_path: Path) -> None:
+    angles = raised_arm()
+    shape, level = np.full(angles.degrees.shape, 3.0), np.full(angles.degrees.shape, 4.0)
+    shape[angles.singular] = level[angles.singular] = np.nan
+    definition = np.full(len(angles.names), 1.5)
+    errors = AngleErrors(angles.names, shape, level, definition, 2.5, 8.0, float("nan"))
+    write_angles(tmp_path, angles, {}, None, errors)
+    about = json.loads((tmp_path / "angles.json").read_text())
+    assert all(row["standard_error"] == {"level": 4.0, "shape": 3.0, "definition": 1.5} for row in about["angles"])
+    assert about["noise"] == {"marker_mm": 2.5, "video_deg": 8.0, "image_share": None}
+    assert "_se" not in (tmp_path / "angles.csv").read_text()
+    write_angles(tmp_path, angles, {}, None, errors, columns=True)
+    with open(tmp_path / "angles.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == ["time", *angles.names, *(f"{name}_se" for name in angles.names)]
+    for i, name in enumerate(angles.names):
+        told = [row[f"{name}_se"] for row in rows]
+        assert told == ["" if flag else "5.0000" for flag in angles.singular[:, i]]
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS)

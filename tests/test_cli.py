@@ -81,7 +81,7 @@ def test_every_option_reaches_the_solver(markers: Path, tmp_path: Path) -> None:
     words = (
         f"solve {markers} --video {tmp_path}/v.mp4 --prior {tmp_path}/p.npz --camera {tmp_path}/full "
         f"--body {tmp_path}/body.npz --up y --units mm --marker-rate 100 --subject Ann --range -1.5:4 --offset -1e-3 "
-        f"--rate-ratio 1.001 --method bundle --convention isb --seed 7 --landmark-pull off "
+        f"--rate-ratio 1.001 --method bundle --convention isb --seed 7 --landmark-pull off --standard-errors "
         f"--known {tmp_path}/person.npz --markers-moved --out {tmp_path}/out"
     )
     assert main(words.split(), fake.services) == 0
@@ -106,6 +106,7 @@ def test_every_option_reaches_the_solver(markers: Path, tmp_path: Path) -> None:
             landmark_pull="off",
             known=tmp_path / "person.npz",
             markers_moved=True,
+            standard_errors=True,
         )
     ]
 

@@ -226,6 +226,21 @@ def test_frames_that_must_not_be_read_are_banded() -> None:
     assert drawing.count('class="band"') == 2
 
 
+def test_standard_errors_are_bands_and_what_was_not_measured_is_dashed() -> None:
+    time = np.arange(100.0)
+    sides = {"left": np.sin(time / 9), "right": 20 + np.cos(time / 9)}
+    error = np.where(time == 50, np.nan, 2.0)
+    curve = AngleCurve("Elbow", "degrees", time, sides, None, {"left": error, "right": error}, frozenset({"left"}))
+    drawing = angle_plot(curve)
+    assert drawing.count('class="spread right"') == drawing.count('class="spread left unmeasured"') == 2
+    assert 'class="line left unmeasured"' in drawing and 'class="line right"' in drawing
+    band = re.search(r'class="spread right" d="M([^"]*)Z"', drawing)[1]
+    corners = np.array([[float(v) for v in corner.split()] for corner in band.split("L")])
+    upper, lower = np.split(corners, 2)
+    line = [float(y) for y in re.findall(r"[ML][\d.]+ ([\d.]+)", line_of(drawing, "right"))][:50]
+    assert np.allclose((upper[:, 1] + lower[::-1, 1]) / 2, line, atol=0.11)
+
+
 def test_images_survive_the_way_to_png() -> None:
     rgba = np.random.default_rng(0).integers(0, 256, (5, 7, 4), dtype=np.uint8)
     np.testing.assert_array_equal(pixels(png(rgba)), rgba)

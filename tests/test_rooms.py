@@ -34,6 +34,7 @@ ROOMS = (
     "solver.fit",
     "solver.fit.labelled",
     "solver.fit.known",
+    "solver.fit.standard_errors",
     "solver.fit.published",
     "solver.markerset",
     "solver.neural",

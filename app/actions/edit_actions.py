@@ -11,7 +11,6 @@ import numpy as np
 from markerscope.app.actions.action import Action, ActionWith, Asks, first, needs, needs_session, or_without
 from markerscope.app.actions.candidate_actions import CANDIDATE_ACTIONS
 from markerscope.app.actions.group_actions import GROUP_ACTIONS, needs_groups, none_selected
-from markerscope.app.actions.run_actions import run_stage
 from markerscope.app.models import edits
 from markerscope.app.models.offsets import found_sync
 from markerscope.app.models.results import Ref
@@ -133,7 +132,7 @@ def _tell_angles(bench: Workbench, asks: Asks, convention: str) -> None:
     """Tell the angles by another convention, at once where there is a fit to tell them of."""
     _set_value(bench, asks, Value("angles", "convention", convention))
     if "fit" in bench.board.current and "angles" not in bench.board.current and not bench.runner.running:
-        run_stage(bench, "angles")
+        bench.runner.run(["angles", "errors"], again=["angles"])
 
 
 def _no_step(bench: Workbench, position: int) -> str:

@@ -34,7 +34,7 @@ def _apply(bench: Workbench, edit: edits.Edit) -> None:
     bench.document.apply(edit)
     bench.selection.select(stage="neutral")
     if "fit" in bench.board.current and not bench.runner.running:
-        bench.runner.run(["neutral", "angles"])
+        bench.runner.run(["neutral", "angles", "errors"])
 
 
 def _has_none(bench: Workbench) -> str:

@@ -220,6 +220,12 @@ def _solve_options(solve: argparse.ArgumentParser) -> None:
     )
     how.add_argument("--convention", choices=get_args(Convention), help="names and signs of the angles")
     how.add_argument(
+        "--standard-errors",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="write a column NAME_se beside each angle in angles.csv (angles.json sums them up in any case)",
+    )
+    how.add_argument(
         "--neutral",
         type=parse_neutral,
         metavar="A:B|FILE|recorded",

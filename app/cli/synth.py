@@ -29,6 +29,7 @@ _GROUPS: dict[str, tuple[tuple[str, Callable[[str], Any], str, str], ...]] = {
         ("spread", float, "SD", "standard deviation of the shape coefficients (default: 0.8)"),
         ("bones", float, "FRACTION", "standard deviation of bone lengths (default: 0.03)"),
         ("bumps", float, "M", "height of swellings and hollows of the skin (default: 0.01)"),
+        ("centres_mm", float, "MM", "spread of joint centres about their usual place in the body (default: 0)"),
     ),
     "what is lost, and what is no marker": (
         ("lost", float, "FRACTION", "samples missing in gaps of heavy-tailed length (default: 0)"),

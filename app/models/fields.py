@@ -31,6 +31,7 @@ TITLES = {
     "fit": "Fit",
     "neutral": "Neutral pose",
     "angles": "Joint angles",
+    "errors": "Standard errors",
     "surface": "Distance to the skin",
     "check": "Doubts",
 }

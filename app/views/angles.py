@@ -10,6 +10,7 @@ import numpy as np
 
 from markerscope.app.views.colours import RGB
 from markerscope.solver.angles.angles import conventions, evidence
+from markerscope.solver.core.angle_errors import AngleErrors
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.skeleton import JOINTS
 from markerscope.widgets import palette
@@ -62,24 +63,30 @@ class AnglesPicture:
 
 
 def angles_picture(
-    angles: JointAngles, marker_joint: np.ndarray | None = None, reference: JointAngles | None = None
+    angles: JointAngles,
+    marker_joint: np.ndarray | None = None,
+    reference: JointAngles | None = None,
+    errors: AngleErrors | None = None,
 ) -> AnglesPicture:
     """The curves of a result.
 
     Parameters
     ----------
     marker_joint : (M,) bone of each marker, -1 for none, to say what each angle rests on
+    errors : standard errors of these angles, drawn as bands where they are of the same convention and frames
     reference : another result in the same convention to compare with; of another, nothing is compared
     """
     column = {name: i for i, name in enumerate(angles.names)}
     grounds = {} if marker_joint is None else evidence(angles.convention, marker_joint)
     other = reference if reference is not None and reference.convention == angles.convention else None
+    fits = errors is not None and errors.names == angles.names and errors.shape.shape == angles.degrees.shape
+    known = errors if fits else None
     plots = []
     for joint, row in conventions()[angles.convention]["joints"].items():
         for pattern in row["columns"]:
             names = _sides(pattern)
             curves = tuple(
-                _curve(angles, column[name], side, grounds.get(name, ""), other)
+                _curve(angles, column[name], side, grounds.get(name, ""), other, known)
                 for side, name in names.items()
                 if name in column
             )
@@ -117,7 +124,14 @@ def _sides(pattern: str) -> dict[Side, str]:
     return {"left": pattern.format(s="l", S="L"), "right": pattern.format(s="r", S="R")}
 
 
-def _curve(angles: JointAngles, i: int, side: Side, rests_on: str, other: JointAngles | None) -> AngleCurve:
+def _curve(
+    angles: JointAngles,
+    i: int,
+    side: Side,
+    rests_on: str,
+    other: JointAngles | None,
+    errors: AngleErrors | None,
+) -> AngleCurve:
     name = angles.names[i]
     compared = None
     if other is not None and name in other.names:
@@ -134,4 +148,5 @@ def _curve(angles: JointAngles, i: int, side: Side, rests_on: str, other: JointA
         positive=angles.positive[i],
         rests_on=rests_on,
         colour=_COLOURS[side],
+        error=None if errors is None else errors.total[:, i].astype(float),
     )

@@ -41,7 +41,7 @@ class AnglesBinder:
             self.widget.set_curves(np.zeros(0), ())
 
     def _changed(self, stages: frozenset[str]) -> None:
-        if stages & {"angles", "fit", "compared"}:
+        if stages & {"angles", "errors", "fit", "compared"}:
             self._filling.start()
 
     def _fill(self) -> None:
@@ -54,8 +54,11 @@ class AnglesBinder:
             return
         bones = motion.marker_joint if motion is not None and not self.shown.stale("fit") else None
         reference, said, missing = self._reference(angles.convention)
+        errors = None if self.shown.stale("errors") else self.shown.get("errors")
         picture = self.shown.once(
-            "angle curves", (angles, bones, reference), lambda: angles_picture(angles, bones, reference)
+            "angle curves",
+            (angles, bones, reference, errors),
+            lambda: angles_picture(angles, bones, reference, errors),
         )
         before, old = self.widget.shown(), self.shown.stale("angles")
         self.widget.set_curves(picture.time, picture.plots, picture.convention, picture.zero_pose, said, missing, old)

@@ -19,7 +19,7 @@ DRAWN: Mapping[str, tuple[str, ...]] = {
     "markers": (*_MARKERS, "segment", "fit", "check"),
     "timelines": (*_MARKERS, "landmarks", "prior", "sync", "segment", "orient", "fit"),
     "curves": (*_MARKERS, "fit"),
-    "angles": ("fit", "neutral", "angles"),
+    "angles": ("fit", "neutral", "angles", "errors"),
 }
 """The stages whose results each view may draw, by panel. Cards and the history stand apart: they name their states."""
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 WANTED = (
     "markers", "clean", "landmarks", "prior", "sync", "segment", "localize", "solve", "orient", "fit", "neutral",
-    "angles", "surface", "check",
+    "angles", "errors", "surface", "check",
 )  # fmt: skip
 
 

@@ -119,8 +119,8 @@ def read_angles(time: np.ndarray, segments: Mapping[str, np.ndarray], settings: 
     settings : which convention
     """
     convention = conventions()[settings.convention]
-    lab = _lab(segments["pelvis"], convention["lab"] == "quarter turns")
-    columns = list(_columns(settings.convention))
+    lab = lab_axes(segments["pelvis"], convention["lab"] == "quarter turns")
+    columns = list(columns_of(settings.convention))
     values, flags = np.zeros((2, len(time), len(columns)))
     for i, column in enumerate(columns):
         near = segments[column.near] if column.near else lab
@@ -148,7 +148,7 @@ def read_angles(time: np.ndarray, segments: Mapping[str, np.ndarray], settings: 
 
 
 def _other_order(
-    flags: np.ndarray, columns: list[_Column], segments: Mapping[str, np.ndarray], convention: Mapping[str, Any]
+    flags: np.ndarray, columns: list[Column], segments: Mapping[str, np.ndarray], convention: Mapping[str, Any]
 ) -> str:
     """Which convention to take where an arm passes through the singularity of this one's sequence; "" for none.
 
@@ -163,7 +163,7 @@ def _other_order(
         return ""
     second: Convention = convention["second"]
     other = read_angles(np.zeros(len(flags)), segments, AngleSettings(second))
-    theirs = [i for i, column in enumerate(_columns(second)) if column.far.endswith("upper_arm")]
+    theirs = [i for i, column in enumerate(columns_of(second)) if column.far.endswith("upper_arm")]
     left = int(other.singular[:, theirs].any(axis=1).sum())
     if left >= lost:
         return ""
@@ -189,7 +189,7 @@ def relative_to(angles: JointAngles, neutral: JointAngles, where: str, same_head
     """
     offset = np.where(neutral.singular[0], 0.0, neutral.degrees[0])
     if not same_heading:
-        offset[[not column.near and column.axis == "Y" for column in _columns(angles.convention)]] = 0.0
+        offset[[not column.near and column.axis == "Y" for column in columns_of(angles.convention)]] = 0.0
     said = f"The pose of {where}. Beneath it, the convention's own zero: {angles.zero_pose}"
     return replace(
         angles,
@@ -215,14 +215,14 @@ def evidence(convention: str, marker_joint: np.ndarray) -> dict[str, str]:
     marked = {JOINTS[j] for j in np.unique(marker_joint) if j >= 0}
     words = {0: "video only", 1: "one segment", 2: "markers"}
     found = {}
-    for column in _columns(convention):
+    for column in columns_of(convention):
         shown = [bool(marked & set(_CARRIERS[name])) for name in (column.near or column.far, column.far)]
         found[column.name] = words[sum(shown)]
     return found
 
 
 @dataclass(frozen=True)
-class _Column:
+class Column:
     """One angle of a convention: rotation ``place`` of the sequence between two segments, or about given axes."""
 
     name: str
@@ -242,7 +242,8 @@ class _Column:
         return self.sequence[self.place] if self.axes is None else ""
 
 
-def _columns(convention: str) -> Iterator[_Column]:
+def columns_of(convention: str) -> Iterator[Column]:
+    """Every angle of a convention, in the order of the files."""
     about = conventions()[convention]
     for joint, row in about["joints"].items():
         axes = np.array(row["axes"]) if "axes" in row else None
@@ -251,7 +252,7 @@ def _columns(convention: str) -> Iterator[_Column]:
             near, far = (part if part in _MIDLINE else f"{side}_{part}" for part in _PAIRS[joint])
             for place, column in enumerate(row["columns"]):
                 if column:
-                    yield _Column(
+                    yield Column(
                         name=column.format(s=side[:1], S=side[:1].upper()),
                         near=near,
                         far=far,
@@ -283,7 +284,7 @@ def _ranges(row: Mapping[str, Any], flipped: bool) -> np.ndarray:
     return ranges
 
 
-def _lab(pelvis: np.ndarray, quarter_turns: bool) -> np.ndarray:
+def lab_axes(pelvis: np.ndarray, quarter_turns: bool) -> np.ndarray:
     """(3, 3) the lab's axes in the internal frame: X along the internal x, Y up, Z to the right of X.
 
     Parameters

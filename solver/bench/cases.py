@@ -96,6 +96,21 @@ def layouts(frames: int, gaps: Path | None) -> tuple[Case, ...]:
     )
 
 
+def bodies(frames: int, gaps: Path | None) -> tuple[Case, ...]:
+    """Bodies like those that the program knows, beside others; skin that moves as much as on real thighs."""
+    base = usual(frames)
+    other = replace(base, spread=1.2, bones=0.06, bumps=0.015, centres_mm=8.0, slide=2.0)
+    return (
+        Case("own-family", base, "the usual case"),
+        Case("own-family-soft-tissue", replace(base, slide=3.0), "skin that slides up to 18 mm on the thigh"),
+        Case("other-bodies", other, "proportions, skin and joint centres that no coefficients reach"),
+        *(
+            Case(f"other-bodies-{name}", replace(other, layout=layout), f"the same with the layout {name}")  # type: ignore[arg-type]
+            for name, layout in {"plug-in-gait": "plug_in_gait", "ior": "ior", "cast": "cast"}.items()
+        ),
+    )
+
+
 def scaling(frames: int, gaps: Path | None) -> tuple[Case, ...]:
     """Time and memory against frames, and against markers."""
     long = tuple(Case(f"{count}-frames", usual(count), "40 markers") for count in (frames, 10 * frames, 100 * frames))
@@ -124,6 +139,7 @@ SUITES: dict[str, Callable[[int, Path | None], tuple[Case, ...]]] = {
     "accuracy": accuracy,
     "parts": parts,
     "layouts": layouts,
+    "bodies": bodies,
     "scaling": scaling,
     "ablation": ablation,
     "short": short,

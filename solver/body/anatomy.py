@@ -122,8 +122,7 @@ def _model_thorax(landmarks: Mapping[str, np.ndarray]) -> np.ndarray:
     model = np.array(list(MODEL_THORAX.values()))
     body = np.stack([landmarks[name] @ UPRIGHT for name in MODEL_THORAX])[:, :2]
     (forward, up), (x, y) = (model - model.mean(axis=0)).T, (body - body.mean(axis=0)).T
-    angle = np.arctan2((forward * y - up * x).sum(), (forward * x + up * y).sum())
-    cos, sin = np.cos(angle), np.sin(angle)
+    cos, sin = _unit(np.array([(forward * x + up * y).sum(), (forward * y - up * x).sum()]))
     return UPRIGHT @ np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
 
 
@@ -149,4 +148,4 @@ def _foot(forward: np.ndarray) -> np.ndarray:
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)
+    return vector / np.sqrt(vector @ vector)  # a complex step goes through it, which no absolute value lets pass

@@ -21,13 +21,14 @@ from markerscope.solver.fit.pull.results import summary as summary_of_pull
 from markerscope.solver.fit.results import Candidate
 from markerscope.solver.fit.second.results import LimbAnswer
 from markerscope.solver.io.camera import camera_file
+from markerscope.solver.io.export_angles import noise_of, standard_error
 from markerscope.solver.io.output_folder import remove_if_empty
 from markerscope.solver.pipeline.cleaning import BY_FRAME
 from markerscope.solver.pipeline.doubts import assumptions, doubts
 from markerscope.solver.pipeline.in_force import write_answers
 from markerscope.solver.pipeline.look import look_at
 from markerscope.solver.pipeline.methods import GRAPHS, graph_of, spelt_out, with_method
-from markerscope.solver.pipeline.names import CHECK, CLEAN, FIT, ORIENT, SURFACE, SYNC
+from markerscope.solver.pipeline.names import CHECK, CLEAN, ERRORS, FIT, ORIENT, SURFACE, SYNC
 from markerscope.solver.pipeline.session import (
     InputFile,
     RunSettings,
@@ -245,6 +246,7 @@ def _said(request: SolveRequest) -> dict[str, dict[str, Any]]:
         **({} if request.markers_moved is None else {"orient": {"markers_moved": request.markers_moved}}),
         **({} if request.part_of_cloud is None else {"localize": {"part_of_cloud": request.part_of_cloud}}),
         "angles": {"convention": request.convention},
+        "errors": {"columns": request.standard_errors},
     }
     said = {
         stage: {name: value for name, value in table.items() if value is not None} for stage, table in options.items()
@@ -305,7 +307,7 @@ def _tidy(session: Session) -> Iterator[None]:
 
 def _outcome(session: Session, graph: GraphRun, not_kept: tuple[str, ...] = ()) -> SolveOutcome:
     motion, ranked, sync, surface = graph[FIT], graph[ORIENT], graph[SYNC], graph[SURFACE]
-    markers, found = graph[CLEAN].markers, graph[CHECK]
+    markers, found, errors = graph[CLEAN].markers, graph[CHECK], graph[ERRORS]
     best = ranked.candidates[motion.chosen]
     summary = {
         "out": str(session.folder),
@@ -324,6 +326,8 @@ def _outcome(session: Session, graph: GraphRun, not_kept: tuple[str, ...] = ()) 
         "sync": {"offset_s": sync.offset, "rate_ratio": sync.rate_ratio, "confidence": sync.confidence},
         "m2s_mm": 1000 * surface.mean,
         "residual_median_mm": float(1000 * np.nanmedian(motion.residual)),
+        "standard_errors_deg": None if errors is None else {n: standard_error(errors, n) for n in errors.names},
+        "noise": None if errors is None else noise_of(errors),
         "doubts": [_doubt(doubt, markers.labels) for doubt in found.doubts],
         "nobodys_markers": [markers.labels[m] for m in found.nobody],
         "suspect_markers": [markers.labels[m] for m in found.suspect],

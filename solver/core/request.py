@@ -53,6 +53,7 @@ class SolveRequest:
     known : a person known from other trials (person.npz): shape and marker places are taken from there
     markers_moved : the markers were put on anew since then, near the same places
     landmark_pull : whether markers are drawn to bony landmarks where their layout has earned it
+    standard_errors : whether ``angles.csv`` has a column of standard errors beside each angle
     """
 
     markers: Path
@@ -79,6 +80,7 @@ class SolveRequest:
     landmark_pull: LandmarkPull | None = None
     known: Path | None = None
     markers_moved: bool | None = None
+    standard_errors: bool | None = None
 
     def __post_init__(self) -> None:
         """Refuse values that no data can make sense of."""

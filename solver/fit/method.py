@@ -27,7 +27,7 @@ from markerscope.solver.fit.placement import Skin
 from markerscope.solver.fit.problem import Problem
 from markerscope.solver.fit.pull.stage import to_landmarks
 from markerscope.solver.fit.refine import every_frame
-from markerscope.solver.fit.results import Candidate, FittedMotion, Localization, Orientation, Steps
+from markerscope.solver.fit.results import Candidate, FittedMotion, Localization, Orientation, Solution, Steps
 from markerscope.solver.fit.second.stage import search_limbs
 from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
 from markerscope.solver.fit.sifting import loose_share, strays, without_place
@@ -171,7 +171,7 @@ def orient(
     weights = replace(settings.weights(), free_bias=not _sees_landmarks(used))
     known = None
     if camera is not None:
-        known = _camera_of(camera, used.lab_centre)
+        known = camera_of(camera, used.lab_centre)
         weights = replace(weights, free_camera=False)
     search = partial(
         relax,
@@ -276,7 +276,8 @@ def fit(
         state, surface = hold(Problem(*around), state, surface, weights)
     pose = every_frame(body, used, landmarks, frames, state, surface, weights, progress)
     motion = fitted_motion(body, seen, found, ranked, settings, state, pose, time)
-    return replace(motion, pull=drawn.pull, second=searched.others)
+    solution = Solution(frames, state.placement, surface, state.bias, weights, drawn.by)
+    return replace(motion, pull=drawn.pull, second=searched.others, solution=solution)
 
 
 def in_use(seen: Observations, found: Localization, ranked: Orientation) -> Observations:
@@ -369,13 +370,13 @@ def state_of(chosen: Candidate, seen: Observations) -> tuple[State, Surface]:
     state = State(
         Pose(chosen.rotations, chosen.trans, chosen.betas),
         Points(chosen.rest, chosen.dirs, chosen.weights),
-        _camera_of(chosen.camera, seen.lab_centre),
+        camera_of(chosen.camera, seen.lab_centre),
         chosen.bias,
     )
     return state, Surface(chosen.surface, chosen.normal)
 
 
-def _camera_of(camera: CameraResult, centre: np.ndarray) -> Camera:
+def camera_of(camera: CameraResult, centre: np.ndarray) -> Camera:
     """The camera written about a lab point, as the fit wants it."""
     return Camera(camera.R_lab_cam, (centre - camera.position) @ camera.R_lab_cam, centre, camera.focal)
 

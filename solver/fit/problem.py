@@ -78,7 +78,7 @@ class Problem:
     def step(self, state: State, weights: Weights, surface: Surface, damping: float) -> State:
         """One damped Gauss-Newton step of everything that is free."""
         sums = self.linearised(state, weights, surface)
-        return self._moved(state, *sums.solve(self._free(weights), damping))
+        return self._moved(state, *sums.solve(self.free(weights), damping))
 
     def frame_step(self, state: State, weights: Weights, surface: Surface, damping: float) -> np.ndarray:
         """(F, 69) rad and m: the step of each frame on its own, with all that they share held."""
@@ -104,8 +104,8 @@ class Problem:
     def _estimate(self, state: State, weights: Weights, surface: Surface) -> Estimate:
         return Estimate(self.body, state, forward(self.body, state.pose), surface, weights, self.unknowns)
 
-    def _free(self, weights: Weights) -> np.ndarray:
-        """Indices of the shared unknowns that may move."""
+    def free(self, weights: Weights) -> np.ndarray:
+        """Indices of the shared unknowns that these weights let move."""
         free = np.zeros(self.unknowns.size, dtype=bool)
         free[self.unknowns.shape] = weights.free_shape
         free[self.unknowns.camera] = weights.free_camera

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from markerscope.solver.core.camera import CameraResult
+from markerscope.solver.fit.kinematics import Points
 from markerscope.solver.fit.pull.results import LandmarkPull
+from markerscope.solver.fit.pull.term import Pull
 from markerscope.solver.fit.second.results import LimbAnswer
-from markerscope.solver.fit.state import no_bias
+from markerscope.solver.fit.state import Surface, Weights, no_bias
 
 
 def _no_markers() -> np.ndarray:
@@ -141,6 +143,28 @@ class Orientation:
     mirror: float = float("nan")
 
 
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """What all frames of a fit share, as the standard errors need it.
+
+    Attributes
+    ----------
+    frames : (N,) keyframes that it was found on
+    placement : of the U markers in use
+    surface : the rest skin below each
+    bias : (K, 3, 3) what turns the video's joints towards the true ones
+    weights : with which every frame was solved
+    pull : what draws markers to bony landmarks; None for nothing
+    """
+
+    frames: np.ndarray
+    placement: Points
+    surface: Surface
+    bias: np.ndarray
+    weights: Weights
+    pull: Pull | None = None
+
+
 @dataclass(frozen=True)
 class FittedMotion:
     """The body fitted to every frame.
@@ -164,6 +188,7 @@ class FittedMotion:
     settled : (T,) True where the frame's iteration came to that, None where it was not iterated so
     pull : which markers were drawn to which bony landmarks; None where the method knows no such thing
     second : second answers for single limbs, that cost hardly more
+    solution : what all frames share; None where the method knows no standard errors
     """
 
     time: np.ndarray
@@ -183,3 +208,4 @@ class FittedMotion:
     settled: np.ndarray | None = None
     pull: LandmarkPull | None = None
     second: tuple[LimbAnswer, ...] = ()
+    solution: Solution | None = None

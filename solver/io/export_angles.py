@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from markerscope.solver.core.angle_errors import AngleErrors
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.plain import json_text
 from markerscope.solver.io.atomic import write_text_atomic
@@ -23,6 +24,8 @@ def write_angles(
     angles: JointAngles,
     provenance: Mapping[str, Any],
     evidence: Mapping[str, str] | None = None,
+    errors: AngleErrors | None = None,
+    columns: bool = False,
 ) -> None:
     """Write ``angles.csv`` (time in s, one column per angle in degrees, empty where singular) and ``angles.json``.
 
@@ -32,10 +35,12 @@ def write_angles(
     ----------
     provenance : program version, digests of the inputs, settings of every stage
     evidence : what each angle rests on, by column name, as ``markerscope.solver.angles.angles.evidence`` gives it
+    errors : standard errors, of which the sidecar has the root mean squares
+    columns : whether ``angles.csv`` has them frame by frame, level and shape together, in columns ``NAME_se``
     """
     folder = Path(folder)
     relative = angles.zero == "neutral"
-    write_text_atomic(folder / "angles.csv", angles_csv(angles))
+    write_text_atomic(folder / "angles.csv", angles_csv(angles, errors if columns else None))
     if relative:
         write_text_atomic(folder / AS_RECORDED, angles_csv(angles.as_recorded))
     about = {
@@ -47,6 +52,7 @@ def write_angles(
         **({"other_order": angles.hint} if angles.hint else {}),
         "units": {"time": "s", "angles": "degrees"},
         "filter": "not filtered",
+        **({} if errors is None else {"noise": noise_of(errors)}),
         "angles": [
             {
                 "column": name,
@@ -56,6 +62,7 @@ def write_angles(
                 "jumps_s": [round(float(t), 6) for t in angles.time[jumps]],
                 **({"neutral_degrees": round(float(angles.neutral[i]), 4)} if relative else {}),
                 **({} if evidence is None else {"evidence": evidence[name]}),
+                **({} if errors is None else {"standard_error": standard_error(errors, name)}),
             }
             for i, (name, sequence, positive, flags, jumps) in enumerate(
                 zip(angles.names, angles.sequence, angles.positive, angles.singular.T, angles.jumps.T, strict=True)
@@ -66,12 +73,29 @@ def write_angles(
     write_text_atomic(folder / "angles.json", json_text(about) + "\n")
 
 
-def angles_csv(angles: JointAngles) -> str:
-    """The wide form: a header line, then a row per frame."""
+def standard_error(errors: AngleErrors, name: str) -> dict[str, float | None]:
+    """Degrees, root mean square over frames, of one angle: level, shape, and the definition's part of the level."""
+    return {part: _rounded(value, 3) for part, value in errors.mean_of(name).items()}
+
+
+def noise_of(errors: AngleErrors) -> dict[str, float | None]:
+    """The noise a coordinate that the session showed: of markers, mm, of the video's joints, degrees, and landmarks."""
+    return {name: _rounded(getattr(errors, name), 4) for name in ("marker_mm", "video_deg", "image_share")}
+
+
+def _rounded(value: float, digits: int) -> float | None:
+    return round(float(value), digits) if np.isfinite(value) else None
+
+
+def angles_csv(angles: JointAngles, errors: AngleErrors | None = None) -> str:
+    """The wide form: a header line, then a row per frame; with standard errors a column ``NAME_se`` for each angle."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["time", *angles.names])
-    values = np.where(angles.singular, np.nan, angles.degrees)
+    values, names = np.where(angles.singular, np.nan, angles.degrees), list(angles.names)
+    if errors is not None:
+        values = np.concatenate([values, errors.total], axis=1)
+        names += [f"{name}_se" for name in angles.names]
+    writer.writerow(["time", *names])
     for time, row in zip(angles.time, values, strict=True):
         writer.writerow([f"{time:.6f}", *("" if np.isnan(v) else f"{v:.4f}" for v in row)])
     return text.getvalue()

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import TYPE_CHECKING, TypedDict, Unpack, cast
 
 import numpy as np
 
-from markerscope.solver.angles.angles import AngleSettings
+from markerscope.solver.angles.angles import AngleSettings, Convention
 from markerscope.solver.cleaning.clean import Cleaned
 from markerscope.solver.clustering.segment import Segmentation, SegmentSettings
+from markerscope.solver.core.angle_errors import AngleErrors
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.camera import CameraResult
 from markerscope.solver.core.landmarks import Landmarks
@@ -20,6 +21,7 @@ from markerscope.solver.fit.known.neutral import Neutral, NeutralSettings
 from markerscope.solver.fit.published.results import PaperLocalization
 from markerscope.solver.fit.results import FittedMotion, Localization, Orientation
 from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
+from markerscope.solver.fit.standard_errors.settings import ErrorSettings
 from markerscope.solver.fit.surface import SurfaceDistance
 from markerscope.solver.pipeline.stage import NoSettings
 from markerscope.solver.sync.offset import Sync
@@ -153,6 +155,29 @@ def read_angles(
         return angles
     zero = joint_angles(fit.time[:1], facing(neutral, fit), *shaped, settings)
     return relative_to(angles, zero, neutral.where, neutral.same_lab_heading)
+
+
+def estimate_errors(
+    settings: ErrorSettings,
+    progress: Progress,
+    *,
+    localize: Localization | PaperLocalization,
+    orient: Orientation,
+    fit: FittedMotion,
+    neutral: Neutral,
+    angles: JointAngles,
+    **given: Unpack[FittedTo],
+) -> AngleErrors | None:
+    """How far off each angle may be; None where the method leaves nothing to tell it from."""
+    from markerscope.solver.fit.method import in_use
+    from markerscope.solver.fit.standard_errors.propagate import standard_errors
+
+    if fit.solution is None or not isinstance(localize, Localization):
+        return None
+    body, seen, points = scene(**given)
+    used = in_use(seen, localize, orient)
+    convention = AngleSettings(cast(Convention, angles.convention))
+    return standard_errors(body, used, points, fit, convention, neutral.rotations, angles.singular, progress)
 
 
 def measure_surface(

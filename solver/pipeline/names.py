@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from markerscope.solver.cleaning.clean import Cleaned
 from markerscope.solver.clustering.segment import Segmentation
+from markerscope.solver.core.angle_errors import AngleErrors
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.landmarks import Landmarks
 from markerscope.solver.core.markers import Markers
@@ -29,6 +30,7 @@ ORIENT = StageName[Orientation]("orient")
 FIT = StageName[FittedMotion]("fit")
 NEUTRAL = StageName[Neutral]("neutral")
 ANGLES = StageName[JointAngles]("angles")
+ERRORS = StageName[AngleErrors | None]("errors")
 SURFACE = StageName[SurfaceDistance]("surface")
 CHECK = StageName[Verdict]("check")
 KNOWN = StageName[Tracked]("known")

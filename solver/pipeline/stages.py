@@ -8,6 +8,7 @@ from markerscope.solver.angles.angles import AngleSettings
 from markerscope.solver.body.model import EMBEDDED
 from markerscope.solver.cleaning.clean import Cleaned
 from markerscope.solver.clustering.segment import Segmentation, SegmentSettings
+from markerscope.solver.core.angle_errors import AngleErrors
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.landmarks import Landmarks
 from markerscope.solver.core.markers import Markers
@@ -17,6 +18,7 @@ from markerscope.solver.fit.known.neutral import Neutral, NeutralSettings
 from markerscope.solver.fit.pull.results import said as said_pull
 from markerscope.solver.fit.results import FittedMotion, Localization, Orientation
 from markerscope.solver.fit.settings import FitSettings, LocalizeSettings, OrientSettings
+from markerscope.solver.fit.standard_errors.settings import ErrorSettings
 from markerscope.solver.fit.surface import SurfaceDistance
 from markerscope.solver.pipeline import cleaning, fitting, inputs
 from markerscope.solver.pipeline.cleaning import CleaningSettings
@@ -109,6 +111,13 @@ def _said_angles(angles: JointAngles) -> str:
     return f"{said}; {angles.hint}" if angles.hint else said
 
 
+def _said_errors(errors: AngleErrors | None) -> str:
+    if errors is None:
+        return "none by this method"
+    level, shape = (float(np.nanmedian(part)) for part in (errors.level, errors.shape))
+    return f"median over angles and frames: level {level:.1f} degrees, shape {shape:.1f} degrees"
+
+
 FITTED_TO = (*fitting.FittedTo.__annotations__,)
 """What every stage of the fit looks at."""
 BODY = (EMBEDDED,)
@@ -176,7 +185,7 @@ GRAPH = (
     ),
     Stage(
         "fit",
-        6,
+        7,
         FitSettings,
         (*FITTED_TO, "localize", "orient", "known_file"),
         fitting.fit_every_frame,
@@ -205,6 +214,17 @@ GRAPH = (
         JointAngles,
         _said_angles,
         cost=0.1,
+        shipped=BODY,
+    ),
+    Stage(
+        "errors",
+        1,
+        ErrorSettings,
+        (*FITTED_TO, "localize", "orient", "fit", "neutral", "angles"),
+        fitting.estimate_errors,
+        AngleErrors | None,
+        _said_errors,
+        cost=2,
         shipped=BODY,
     ),
     Stage(

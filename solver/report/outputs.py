@@ -28,7 +28,7 @@ from markerscope.solver.io.export_smpl import write_smpl_npz
 from markerscope.solver.io.together import together
 from markerscope.solver.pipeline.digest import canonical, file_digest
 from markerscope.solver.pipeline.methods import graph_of
-from markerscope.solver.pipeline.names import ANGLES, CLEAN, FIT
+from markerscope.solver.pipeline.names import ANGLES, CLEAN, ERRORS, FIT
 from markerscope.solver.pipeline.session import Session
 from markerscope.solver.pipeline.source import changed
 from markerscope.solver.pipeline.stage import GraphRun
@@ -162,7 +162,9 @@ def _write(
         named = replace(named, labels=markers.labels)
     not_kept: tuple[str, ...] = ()
     if "angles" in formats or "angles_long" in formats:  # the long form, too, has its convention beside it
-        write_angles(folder, angles, about, evidence(angles.convention, motion.marker_joint))
+        columns = session.stage_settings(graph_of(session))["errors"].columns
+        grounds = evidence(angles.convention, motion.marker_joint)
+        write_angles(folder, angles, about, grounds, graph[ERRORS], columns)
     if "angles_long" in formats:
         write_text_atomic(folder / "angles_long.csv", angles_long_csv(angles))
     if "mot" in formats:

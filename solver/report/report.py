@@ -51,6 +51,8 @@ def render(data: ReportData) -> str:
         cap_mm=affinity_cap(data.groups) * 1000 if data.groups else 0,
         angles=[(curve, Markup(angle_plot(curve))) for curve in data.angles],
         gait=Markup(data.gait),
+        has_errors=any(curve.errors for curve in data.angles),
+        has_unmeasured=any(curve.unmeasured for curve in data.angles),
         gaps=Markup(gaps_plot(data.gaps)) if data.gaps is not None and data.gaps.present.size else "",
         drawn=any(r.landmark for r in data.residuals),
         worst=max((r.mean_mm for r in data.residuals if math.isfinite(r.mean_mm)), default=1.0),

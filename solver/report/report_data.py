@@ -95,6 +95,8 @@ class AngleCurve:
     time : (T,) s
     sides : values (T,) by side: "left" and "right", or "" for the trunk and pelvis; NaN where unknown
     singular : (T,) True where the angle is not defined by the pose and must not be read, or None
+    errors : (T,) standard error by side, where it is known
+    unmeasured : sides with no marker on either segment, whose curve is what the video says
     """
 
     title: str
@@ -102,6 +104,8 @@ class AngleCurve:
     time: np.ndarray
     sides: Mapping[str, np.ndarray]
     singular: np.ndarray | None = None
+    errors: Mapping[str, np.ndarray] = field(default_factory=dict)
+    unmeasured: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)

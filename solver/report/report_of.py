@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from markerscope.solver.angles.angles import evidence
 from markerscope.solver.body.bones import load_body
 from markerscope.solver.clustering.segment import Segmentation
+from markerscope.solver.core.angle_errors import AngleErrors
 from markerscope.solver.core.angle_table import JointAngles
 from markerscope.solver.core.markers import Markers
 from markerscope.solver.core.skeleton import BONES, JOINTS
@@ -19,7 +21,7 @@ from markerscope.solver.figures.svg import svg
 from markerscope.solver.fit.pull.results import words_of
 from markerscope.solver.fit.results import FittedMotion, Orientation
 from markerscope.solver.pipeline.doubts import doubts
-from markerscope.solver.pipeline.names import ANGLES, CHECK, CLEAN, FIT, ORIENT, PRIOR, SEGMENT, SURFACE, SYNC
+from markerscope.solver.pipeline.names import ANGLES, CHECK, CLEAN, ERRORS, FIT, ORIENT, PRIOR, SEGMENT, SURFACE, SYNC
 from markerscope.solver.pipeline.session import Session
 from markerscope.solver.pipeline.stage import GraphRun
 from markerscope.solver.report.gait import gait_of
@@ -102,7 +104,7 @@ def _data(session: Session, graph: GraphRun, named: Markers, about: Mapping[str,
         groups=_groups(markers, graph[SEGMENT]),
         hypotheses=_hypotheses(ranked, motion),
         margin=ranked.margin,
-        angles=_curves(graph[ANGLES]),
+        angles=_curves(graph[ANGLES], graph[ERRORS], evidence(graph[ANGLES].convention, motion.marker_joint)),
         gait="" if gait is None else svg(gait.page),
         gait_notes=() if gait is None else gait.notes,
         zero_pose=graph[ANGLES].zero_pose,
@@ -141,8 +143,8 @@ def _hypotheses(ranked: Orientation, motion: FittedMotion) -> tuple[Hypothesis, 
     )
 
 
-def _curves(angles: JointAngles) -> tuple[AngleCurve, ...]:
-    """One curve per angle, left and right together."""
+def _curves(angles: JointAngles, errors: AngleErrors | None, grounds: Mapping[str, str]) -> tuple[AngleCurve, ...]:
+    """One curve per angle, left and right together, with its standard errors and whether anything was measured."""
     columns: dict[str, dict[str, int]] = {}
     for i, name in enumerate(angles.names):
         title, side = title_and_side(name, angles.names)
@@ -153,7 +155,9 @@ def _curves(angles: JointAngles) -> tuple[AngleCurve, ...]:
         if not any(np.isfinite(v).any() for v in values.values()):
             continue
         flagged = np.any([angles.singular[:, i] for i in sides.values()], axis=0)
-        curves.append(AngleCurve(title, "degrees", angles.time, values, flagged))
+        spread = {} if errors is None else {side: errors.total[:, i] for side, i in sides.items()}
+        unmeasured = frozenset(side for side, i in sides.items() if grounds[angles.names[i]] == "video only")
+        curves.append(AngleCurve(title, "degrees", angles.time, values, flagged, spread, unmeasured))
     return tuple(curves)
 
 

@@ -15,6 +15,7 @@ from markerscope.solver.report.report_data import AngleCurve, Gaps, Groups
 _JUMP_DEG = 120.0
 """A larger step between two frames is one of the reading, which came in again at the other end of its range."""
 _MOST_BUCKETS = 320
+_BAND_POINTS = 200
 _TEAL, _SLATE, _AMBER = (15, 138, 138), (120, 134, 150), (214, 98, 43)
 
 
@@ -128,6 +129,8 @@ def affinity_legend(groups: Groups) -> str:
 def angle_plot(curve: AngleCurve, limits: tuple[float, float] | None = None) -> str:
     """One angle over time; a gap where it is unknown, a grey band where it must not be read.
 
+    Two standard errors each way are a band in the colour of the side; what was not measured is pale and dashed.
+
     Parameters
     ----------
     limits : of the vertical axis, where several plots share one; None fits the curve
@@ -137,7 +140,14 @@ def angle_plot(curve: AngleCurve, limits: tuple[float, float] | None = None) -> 
     values = np.concatenate(known) if known else np.zeros(0)
     if not len(values):
         return '<p class="quiet">No frame of this angle is known.</p>'
-    low, high = limits or (float(values.min()), float(values.max()))
+    low, high = float(values.min()), float(values.max())
+    bands = {side: (line - 2 * curve.errors[side], line + 2 * curve.errors[side])
+             for side, line in curve.sides.items() if side in curve.errors}  # fmt: skip
+    for side, (under, over) in bands.items():
+        if side in curve.unmeasured or not np.isfinite(under).any():
+            continue  # else what is hardly known would flatten what is measured
+        low, high = min(low, float(np.nanmin(under))), max(high, float(np.nanmax(over)))
+    low, high = limits or (low, high)
     pad = max(0.06 * (high - low), 1.0)
     low, high = low - pad, high + pad
     start, end = float(curve.time[0]), float(max(curve.time[-1], curve.time[0] + 1e-6))
@@ -162,10 +172,18 @@ def angle_plot(curve: AngleCurve, limits: tuple[float, float] | None = None) -> 
             xa, wide = float(x(curve.time[a])), float(x(curve.time[b]) - x(curve.time[a]))
             size = f'width="{max(wide, 1.5):.1f}" height="{height - top - bottom}"'
             parts.append(f'<rect class="band" x="{xa:.1f}" y="{top}" {size}/>')
+    for side, (under, over) in bands.items():
+        kind = f"spread {side or 'both'}{' unmeasured' if side in curve.unmeasured else ''}"
+        for a, b in _runs(np.isfinite(under)):
+            at = np.unique(np.linspace(a, b, min(b - a + 1, _BAND_POINTS)).astype(int))
+            xs, edges = x(curve.time[at]), [np.clip(y(v[at]), top, height - bottom) for v in (over, under)]
+            outline = [*zip(xs, edges[0]), *zip(xs[::-1], edges[1][::-1])]
+            parts.append(f'<path class="{kind}" d="M{"L".join(f"{u:.1f} {v:.1f}" for u, v in outline)}Z"/>')
     for side, line in curve.sides.items():
         keep = _thinned(line)
         path = _path(x(curve.time[keep]), y(line[keep]), np.abs(np.diff(line[keep])) > _JUMP_DEG)
-        parts.append(f'<path class="line {side or "both"}" d="{path}"/>')
+        pale = " unmeasured" if side in curve.unmeasured else ""
+        parts.append(f'<path class="line {side or "both"}{pale}" d="{path}"/>')
     return "".join([*parts, "</svg>"])
 
 

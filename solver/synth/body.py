@@ -12,13 +12,16 @@ from markerscope.solver.core.meshes import vertex_normals
 from markerscope.solver.core.skeleton import INDEX, JOINTS, PARENTS, mirror_index
 
 
-def vary_body(body: Body, rng: np.random.Generator, *, bones: float = 0.03, bumps: float = 0.010) -> Body:
+def vary_body(
+    body: Body, rng: np.random.Generator, *, bones: float = 0.03, bumps: float = 0.010, centres: float = 0.0
+) -> Body:
     """A body whose mean lies outside of its shape basis, so that no coefficients reach it.
 
     Parameters
     ----------
     bones : standard deviation of the factor on each bone's length, alike left and right but for a third of it
     bumps : m, the height of some ten smooth swellings and hollows of the skin
+    centres : m, standard deviation of each coordinate of a joint's centre about its usual place under the skin
     """
     both = rng.normal(0, bones, len(JOINTS))
     factor = 1 + 0.5 * (both + both[mirror_index()]) + rng.normal(0, bones / 3, len(JOINTS))
@@ -44,6 +47,10 @@ def vary_body(body: Body, rng: np.random.Generator, *, bones: float = 0.03, bump
         fall = np.exp(-0.5 * np.sum((skin - skin[centre]) ** 2, axis=1) / reach**2)
         fall *= headless * np.maximum(normals @ normals[centre], 0)  # not the other side of a limb
         skin = skin + bumps * rng.uniform(-1, 1) * fall[:, None] * normals[centre]
+    if centres:  # alike left and right but for a third of it, as the lengths are
+        moved = rng.normal(0, centres, (len(JOINTS), 3))
+        mirrored = moved[mirror_index()] * (-1, 1, 1)
+        new = new + (moved + mirrored) / np.sqrt(2) + rng.normal(0, centres / 3, moved.shape)
     return replace(body, template=skin, joint_template=new, name=f"{body.name}, varied", digest="", _torch={})
 
 

@@ -114,7 +114,7 @@ def _body(settings: SynthSettings, seed: int) -> tuple[Body, np.ndarray]:
     betas = stream(seed, "betas").normal(0, settings.spread, plain.shape_count)
     if settings.shape == "inside":
         return vary_bones(plain, rng, settings.bones), betas
-    return vary_body(plain, rng, bones=settings.bones, bumps=settings.bumps), betas
+    return vary_body(plain, rng, bones=settings.bones, bumps=settings.bumps, centres=settings.centres_mm / 1000), betas
 
 
 def _on_body(

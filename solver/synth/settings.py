@@ -46,6 +46,7 @@ class SynthSettings:
     spread : standard deviation of each shape coefficient
     bones : standard deviation of bone lengths about what the shape says, as a fraction
     bumps : m, height of swellings and hollows of the skin (``outside`` only)
+    centres_mm : mm, spread of joint centres about their usual place under the skin (``outside`` only)
     slide : times the usual sliding of skin over bone, some 2 to 6 mm
     jitter_mm : mm, white noise a coordinate
     offset_mm, offset_spread_mm : mm, mean and spread of the height of markers above the skin
@@ -78,6 +79,7 @@ class SynthSettings:
     spread: float = 0.8
     bones: float = 0.03
     bumps: float = 0.010
+    centres_mm: float = 0.0
     slide: float = 1.0
     jitter_mm: float = 0.4
     offset_mm: float = 9.5
@@ -132,6 +134,7 @@ _RANGE: dict[str, tuple[float, float]] = {
     "spread": (0, 5),
     "bones": (0, 0.2),
     "bumps": (0, 0.05),
+    "centres_mm": (0, 30),
     "jitter_mm": (0, 1000),
     "offset_mm": (0, 100),
     "offset_spread_mm": (0, 50),

@@ -104,7 +104,7 @@ def test_every_table_has_one_place() -> None:
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["fast"], "accuracy, parts, layouts, scaling"),
+        (["fast"], "accuracy, parts, layouts, bodies, scaling"),
         (["short", "--methods", "mosh"], "bundle, paper"),
         (["short", "--cases", "right-leg"], "left-leg"),
         (["short", "--motions", "nowhere"], "no such folder"),

@@ -39,7 +39,7 @@ from tests.fit.conftest import simulate
 from tests.synthetic import Recording, record, session
 
 TINY = {"localize": {"yaws": 6, "few": 4, "many": 6, "keep": 3}, "orient": {"refine": 2}}
-FITTED = {"localize", "orient", "fit", "neutral", "angles", "surface", "check"}
+FITTED = {"localize", "orient", "fit", "neutral", "angles", "errors", "surface", "check"}
 
 
 @pytest.fixture(scope="module")
@@ -93,8 +93,8 @@ def edited(folder: Path, edits: Mapping[str, Mapping[str, Any]]) -> SolveRequest
         ("segment", "threshold", 0.01, {"segment"} | FITTED),
         ("localize", "keep", 5, FITTED),
         ("orient", "offset_mm", 12.0, FITTED - {"localize"}),
-        ("fit", "candidate", 1, {"fit", "neutral", "angles", "surface", "check"}),
-        ("angles", "convention", "isb", {"angles"}),
+        ("fit", "candidate", 1, {"fit", "neutral", "angles", "errors", "surface", "check"}),
+        ("angles", "convention", "isb", {"angles", "errors"}),
     ],
 )
 def test_a_setting_changes_what_depends_on_it(stage: str, name: str, value: Any, changed: set[str]) -> None:
@@ -147,7 +147,7 @@ def test_the_second_time_nothing_is_computed_nor_written(mine: Path) -> None:
 
 def test_another_convention_computes_the_angles_alone_and_going_back_nothing(mine: Path) -> None:
     first = (mine / "angles.csv").read_bytes()
-    assert computed(SolveRequest(mine, convention="isb")) == {"angles"}
+    assert computed(SolveRequest(mine, convention="isb")) == {"angles", "errors"}
     assert b"knee_flexion_r" in (mine / "angles.csv").read_bytes()
     assert json.loads((mine / "angles.json").read_text())["convention"] == "isb"
     assert computed(SolveRequest(mine)) == set(), "what was asked for stays in the session"
@@ -197,7 +197,7 @@ def test_a_method_that_draws_no_markers_says_so(mine: Path) -> None:
 def test_a_pinned_candidate_is_used_and_can_be_let_go(mine: Path) -> None:
     first = content(mine)
     outcome = solve_session(edited(mine, {"fit": {"candidate": 1}}), silent)
-    assert set(outcome.summary["computed"]) == {"fit", "neutral", "angles", "surface", "check"}
+    assert set(outcome.summary["computed"]) == {"fit", "neutral", "angles", "errors", "surface", "check"}
     assert any("pinned by hand" in warning for warning in outcome.warnings)
     assert outcome.summary["confidence"] < 1, "a decision by hand is no evidence"
     assert json.loads((mine / "angles.json").read_text())["edits"] == {"fit": {"candidate": 1}}
@@ -306,7 +306,7 @@ def test_outputs_change_all_together_or_not_at_all(mine: Path, monkeypatch: pyte
         solve_session(SolveRequest(mine, convention="isb"), silent)
     after = content(mine)
     assert {name: after[name] for name in before} == before
-    assert {name.split("/")[1] for name in after.keys() - before.keys()} == {"angles"}, "only the finished stage"
+    assert {name.split("/")[1] for name in after.keys() - before.keys()} == {"angles", "errors"}, "only finished stages"
 
 
 @pytest.mark.parametrize("worth", [0.0, 1e9])

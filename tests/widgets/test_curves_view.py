@@ -50,6 +50,21 @@ def curves(qapp: QApplication) -> Iterator[CurvesView]:
     made.close()
 
 
+def test_bands_are_drawn_about_what_is_measured_and_told_of(curves: CurvesView) -> None:
+    def drawn(error: float | None, rests: str = "markers") -> tuple[np.ndarray, str]:
+        about = None if error is None else np.full(len(TIME), error)
+        curve = AngleCurve("knee_angle_l", "left", 20 + 10 * TIME, None, "", rests, palette.LEFT, about)
+        curves.set_curves(TIME, [AnglePlot("knee", "Knee", (curve,))])
+        curves.set_shown(["Knee"])
+        QApplication.processEvents()
+        return pixels(curves.plots), curves._title.text()
+
+    bare, banded, guessed = drawn(None), drawn(2.0), drawn(2.0, "video only")
+    assert "standard errors" not in bare[1] and "two standard errors" in banded[1]
+    assert "no marker on either segment" in guessed[1] and "no marker" not in banded[1]
+    assert (bare[0] != banded[0]).any(axis=-1).mean() > 0.02, "an area, not a line"
+
+
 @pytest.fixture
 def descents(qapp: QApplication) -> Iterator[ConvergenceView]:
     theme.apply(qapp, "light")

@@ -156,7 +156,10 @@ def curves() -> QWidget:
                 size, lag = rng.uniform(8, 45), rng.uniform(0, 1)
                 degrees = size * (1 - np.cos(1.6 * time + lag)) + rng.normal(0, 0.4, 360)
                 degrees[100:130] = np.nan if side == "right" else degrees[100:130]
-                made.append(AngleCurve(f"{joint}_{name}_{side[:1]}", side, degrees, degrees * 0.93 + 3, name, "", ink))
+                rests = "video only" if side == "left" and joint == "ankle" else ""
+                error = 1.5 + 0.03 * size * (1 + np.sin(time)) if not rests else np.full(360, 9.0)
+                compared = degrees * 0.93 + 3
+                made.append(AngleCurve(f"{joint}_{name}_{side[:1]}", side, degrees, compared, name, rests, ink, error))
             plots.append(AnglePlot(joint, f"{joint.capitalize()} {name}", tuple(made)))
     view = CurvesView()
     view.set_curves(time, plots, "OpenSim gait model", "the T pose")

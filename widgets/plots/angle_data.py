@@ -23,6 +23,7 @@ class AngleCurve:
     rests_on : what it was found from: "markers", "one segment" (of two, one carries markers), "video only"; ""
         if unknown
     colour : of its side
+    error : (T,) degrees, standard error, None where it is not known
     """
 
     name: str
@@ -32,6 +33,17 @@ class AngleCurve:
     positive: str = ""
     rests_on: str = ""
     colour: Rgb = (0, 114, 178)
+    error: np.ndarray | None = None
+
+    @property
+    def unmeasured(self) -> bool:
+        """Whether no marker sits on either segment: the curve is what the video says."""
+        return self.rests_on == "video only"
+
+    @property
+    def band(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """(T,) and (T,) two standard errors below and above."""
+        return None if self.error is None else (self.degrees - 2 * self.error, self.degrees + 2 * self.error)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from PySide6.QtGui import QFontMetricsF, QHelpEvent, QMouseEvent, QPainter, QPai
 from PySide6.QtWidgets import QToolTip, QWidget
 
 from markerscope.widgets import palette
-from markerscope.widgets.plots.curve_paint import draw_curve, frame_at
-from markerscope.widgets.plots.ink import colour, elided, em, legible, pen, y_axis
+from markerscope.widgets.plots.curve_paint import draw_band, draw_curve, frame_at
+from markerscope.widgets.plots.ink import colour, elided, em, faded, legible, pen, y_axis
 from markerscope.widgets.plots.rows import Curve
 from markerscope.widgets.plots.scales import Scale, clock, limits, number, time_ticks
 from markerscope.widgets.theme import colours
@@ -20,6 +20,8 @@ from markerscope.widgets.theme import colours
 OUT_OF_DATE = "out of date"
 _JUMP_DEG = 120.0
 """A larger step between two frames is one of the reading, which came in again at the other end of its range."""
+_PALE, _PALER = 90, 30
+"""Opacity, of 255, of the band of what was measured and of what was not."""
 _COLUMN_EM = 34.0
 """Lines of text that a column of plots is wide before there are two."""
 
@@ -169,9 +171,10 @@ class AnglePlots(QWidget):
             beside = len(plot.curves) * (metrics.horizontalAdvance("L −000.0°") + 24)
             room = QRectF(area.left(), area.top() - 1.2 * line, max(area.width() - beside, 40), 1.1 * line)
             elided(painter, room, f"{plot.title}, {OUT_OF_DATE}" if self._old else plot.title)
-            low, high = limits(
-                [c.degrees for c in plot.curves] + [c.reference for c in plot.curves if c.reference is not None]
-            )
+            shown = [c.degrees for c in plot.curves] + [c.reference for c in plot.curves if c.reference is not None]
+            # The band of what is hardly known would flatten what is measured.
+            shown += [edge for c in plot.curves if c.band is not None and not c.unmeasured for edge in c.band]
+            low, high = limits(shown)
             if high - low < 10:  # a joint that rests should look at rest
                 low, high = (low + high) / 2 - 5, (low + high) / 2 + 5
             x, y = self.scale(area), Scale(low, high, area.bottom(), area.top())
@@ -181,17 +184,30 @@ class AnglePlots(QWidget):
                 painter.setPen(pen(look.border, 1.2))
                 painter.drawLine(QPointF(area.left(), y.at(0)), QPointF(area.right(), y.at(0)))
             for curve in plot.curves:
+                if curve.band is not None:
+                    below, above = curve.band
+                    ground = colour(faded(legible(curve.colour)), _PALER if curve.unmeasured else _PALE)
+                    draw_band(painter, x, y, self._time, (below, above), ground)
+            for curve in plot.curves:
                 ink = np.array(curve.colour, np.uint8)
                 if curve.reference is not None:
                     reference = _broken("", self._time, curve.reference, ink, dashed=True)
                     draw_curve(painter, area, x, y, reference, self._time)
-                own = _broken(curve.name, self._time, curve.degrees, ink, old=self._old)
+                pale = self._old or curve.unmeasured
+                own = _broken(curve.name, self._time, curve.degrees, ink, dashed=curve.unmeasured, old=pale)
                 draw_curve(painter, area, x, y, own, self._time)
             painter.setClipping(False)
             if k + columns >= len(areas):
                 self._draw_clock(painter, area, x)
         painter.end()
         return picture
+
+    def _said_error(self, curve: Any) -> str:
+        """The standard error at the cursor, in words."""
+        if curve.error is None or not len(self._time):
+            return ""
+        error = float(curve.error[frame_at(self._time, self._cursor)])
+        return f"; standard error {number(error, 0.1)}° here" if np.isfinite(error) else ""
 
     def _draw_clock(self, painter: QPainter, area: QRectF, x: Scale) -> None:
         metrics = QFontMetricsF(self.font())
@@ -227,7 +243,7 @@ class AnglePlots(QWidget):
             for curve in self._plots[plot].curves if plot >= 0 else ():
                 meaning = f": positive is {curve.positive}" if curve.positive else ""
                 rests = f" (rests on {curve.rests_on})" if curve.rests_on else ""
-                lines.append(f"{curve.name}, degrees{meaning}{rests}")
+                lines.append(f"{curve.name}, degrees{meaning}{rests}{self._said_error(curve)}")
             QToolTip.showText(event.globalPos(), "\n".join(lines), self)
             return True
         return super().event(event)

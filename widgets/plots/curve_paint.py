@@ -6,13 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QFontMetricsF, QPainter
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter
 
 from markerscope.widgets.plots.decimate import envelope
-from markerscope.widgets.plots.ink import colour, faded, legible, pen, polyline
+from markerscope.widgets.plots.ink import colour, faded, legible, pen, polygon, polyline, runs
 from markerscope.widgets.plots.rows import Curve
 from markerscope.widgets.plots.scales import Scale
 from markerscope.widgets.theme import colours
+
+_BAND_POINTS = 600
 
 
 def frame_at(time: np.ndarray, at: float) -> int:
@@ -44,6 +46,26 @@ def draw_curve(
     at, values = envelope(clock_of, curve.values, x.low, x.high, max(1, round(area.width())))
     painter.setPen(pen(ink_of(curve), 1.6, curve.dashed))
     polyline(painter, x.pixel(at), y.pixel(values))
+
+
+def draw_band(
+    painter: QPainter, x: Scale, y: Scale, time: np.ndarray, edges: tuple[np.ndarray, np.ndarray], ground: QColor
+) -> None:
+    """An area between two curves (T,), interrupted where they are not finite; as many points as there are pixels."""
+    low, high = edges
+    seen = np.flatnonzero((time >= x.low) & (time <= x.high))
+    if not len(seen):
+        return
+    first, last = max(int(seen[0]) - 1, 0), min(int(seen[-1]) + 2, len(time))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(ground)
+    for start, end in runs(np.isfinite(low[first:last]) & np.isfinite(high[first:last])):
+        count = min(end - start, _BAND_POINTS)
+        at = first + np.unique(np.linspace(start, end - 1, count).round().astype(int))
+        across = x.pixel(time[at])
+        edge = np.concatenate([y.pixel(high[at]), y.pixel(low[at])[::-1]])
+        painter.drawPolygon(polygon(np.concatenate([across, across[::-1]]), edge))
+    painter.setBrush(Qt.BrushStyle.NoBrush)
 
 
 def legend(painter: QPainter, area: QRectF, curves: tuple[Curve, ...]) -> None:

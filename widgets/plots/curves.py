@@ -157,10 +157,14 @@ class CurvesView(QWidget):
         zero = f" Counted from {zero_pose[:1].lower()}{zero_pose[1:].rstrip('.')}." if zero_pose else ""
         dashed = any(curve.reference is not None for plot in plots for curve in plot.curves)
         against = f" Dashed: {reference or 'compared with'}." if dashed else ""
+        every = [curve for plot in plots for curve in plot.curves]
+        bands = " Bands: within two standard errors." if any(curve.error is not None for curve in every) else ""
+        if any(curve.unmeasured for curve in every):
+            bands += " Pale and dashed: no marker on either segment, the video's guess."
         told = "Degrees." if self.convention.count() else f"{convention}, degrees."
         told = f"Out of date. {told}" if old else told
         self._old = old
-        self._title.setText(f"{told}{against} {missing}".rstrip() if plots else "")
+        self._title.setText(f"{told}{against}{bands} {missing}".rstrip() if plots else "")
         self._title.setToolTip(f"{convention}, degrees.{zero}" if plots else "")
         if not again:
             self._fill()

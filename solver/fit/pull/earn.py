@@ -20,7 +20,7 @@ SPREADS = (0.025, 0.018, 0.012)
 """m, of hands and of what the fit misses: less as the fit nears the landmarks. The first one judges the layout."""
 _ROUNDS = 2
 _PHASE = Phase(0.01, 0.04, 3, free_placement=True)
-_KAPPA = 6.0
+KAPPA = 6.0
 """A marker on its landmark for certain counts as this many sightings of it there, in all frames together."""
 _FAR_M = 0.016
 """A layout whose hits lie further beside the landmarks than this, along each direction, was not palpated there."""
@@ -77,7 +77,7 @@ def draw(
             given = mixture.densities(distance, spread, skin_area(body))
             chance = np.where(fixed, 1.0, mixture.expectation(np.where(fixed, 0.0, given), share))
             share = mixture.share_of(chance[free]) if earned else 0.0
-            pull = Pull.of(chance, _KAPPA / spread**2, targets)
+            pull = Pull.of(chance, KAPPA / spread**2, targets)
             problem = Problem(body, replace(seen, further=(*seen.further, pull)), landmarks)
             now, skin, _ = descend(problem, now, skin, (_PHASE,), weights)
             targets, distance = _distances(body, now, weights, allowed)

@@ -82,7 +82,7 @@ class ImageLandmarks:
             return 0.0
         camera = at.state.camera
         local = camera.to_camera(place_points(self.points, at.links, at.state.pose.betas))
-        cost = float(self._residual(local, camera, at.weights)[2].sum())
+        cost = float(self.residual(local, camera, at.weights)[2].sum())
         cost += (focal_residual(camera, self.image_size, at.weights) / at.weights.focal_spread) ** 2
         return cost / at.frames
 
@@ -93,7 +93,7 @@ class ImageLandmarks:
         points, camera, weights, unknowns = self.points, at.state.camera, at.weights, at.unknowns
         where = place_points(points, at.links, at.state.pose.betas)
         local = camera.to_camera(where)
-        residual, information, _ = self._residual(local, camera, weights)
+        residual, information, _ = self.residual(local, camera, weights)
         root = np.sqrt(information)[..., None]
         by_local = root[..., None] * projection_jacobian(local, camera)
         by_lab = by_local @ camera.R_lab_cam.T
@@ -110,7 +110,8 @@ class ImageLandmarks:
         sums.h_ss[focal_at, focal_at] += 1 / weights.focal_spread**2
         sums.g_s[focal_at] += focal_residual(camera, self.image_size, weights) / weights.focal_spread**2
 
-    def _residual(
+    def residual(
         self, local: np.ndarray, camera: Camera, weights: Weights
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As ``image_residual``, of these landmarks in camera coordinates (N, L, 3)."""
         return image_residual(local, camera, self.pixels, self.visible, self.person, self.image_size, weights)

@@ -21,7 +21,7 @@ from markerscope.solver.pipeline.run import run_session
 from markerscope.solver.pipeline.session import InputFile, Session, save_session
 from markerscope.solver.sync.offset import Sync
 
-FITTED = {"localize", "orient", "fit", "neutral", "angles", "surface", "check"}
+FITTED = {"localize", "orient", "fit", "neutral", "angles", "errors", "surface", "check"}
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def stale(board: StageBoard) -> set[str]:
 def test_a_solved_session_is_cached_throughout(board: StageBoard) -> None:
     assert set(states_of(board).values()) == {"cached"}
     assert board.names[:4] == ("markers", "clean", "landmarks", "prior")
-    assert board.names[-5:] == ("fit", "neutral", "angles", "surface", "check")
+    assert board.names[-6:] == ("fit", "neutral", "angles", "errors", "surface", "check")
     card = board.card("fit")
     assert "frames, markers" in card.headline
     assert card.seconds is not None

@@ -1,0 +1,1 @@
+"""Standard errors of joint angles from the Gauss-Newton matrices of the fit."""
