@@ -151,7 +151,7 @@ class Points:
         InputError : pandas is not installed
         """
         pd: Any = _library("pandas")
-        columns = pd.MultiIndex.from_product([self.names, "xyz"], names=["point", "axis"])
+        columns = pd.MultiIndex.from_product([self.names, list("xyz")], names=["point", "axis"])
         table = self.positions.reshape(len(self.time), -1)
         return pd.DataFrame(table, index=pd.Index(self.time, name="time"), columns=columns)
 
