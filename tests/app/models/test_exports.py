@@ -78,7 +78,7 @@ def test_stale_results_are_not_exported(board: StageBoard, tmp_path: Path) -> No
     assert why_not(board) == ""
     board.document.apply(edits.set_value(board.document.session, "fit", "video_share", 0.3))
     assert why_not(board).startswith(
-        "not there under these settings: Fit, Neutral pose, Joint angles, Distance to the skin"
+        "not there under these settings: Fit, Neutral pose, Joint angles, Standard errors, Distance to the skin"
     )
     with pytest.raises(InputError, match="run all stages first"):
         export(board, tmp_path / "out", ["angles"])
