@@ -188,7 +188,7 @@ def test_the_wheel_holds_every_file_and_no_other_name(wheel: Path) -> None:
         held = {name for name in file.namelist() if ".dist-info/" not in name}
     there = {path.relative_to(ROOT) for part in PARTS for path in (ROOT / part).rglob("*") if path.is_file()}
     wanted = {f"markerscope/{path.as_posix()}" for path in there if "__pycache__" not in path.parts}
-    assert held == wanted | {"markerscope/__init__.py"}
+    assert held == wanted | {"markerscope/__init__.py", "markerscope/py.typed"}
 
 
 def test_the_wheel_solves_the_demo_outside_of_the_tree(from_wheel: Place, tmp_path: Path) -> None:
