@@ -24,7 +24,7 @@ def shortened(tmp_path: Path) -> Callable[[Path], Path]:
     def copy(script: Path) -> Path:
         if script.stem in NEEDS:
             pytest.importorskip(NEEDS[script.stem])
-        text = script.read_text(encoding="utf-8").replace("frames=150", "frames=30").replace("frames=200", "frames=80")
+        text = script.read_text(encoding="utf-8").replace("frames=150", "frames=40").replace("frames=200", "frames=80")
         own = tmp_path / "work.py"
         own.write_text(text, encoding="utf-8")
         return own
