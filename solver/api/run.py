@@ -21,7 +21,6 @@ from markerscope.solver.core.request import (
     LandmarkPull,
     Method,
     SolveRequest,
-    SynthRequest,
     Units,
     Up,
     check_inputs,
@@ -236,7 +235,8 @@ def simulate(
     ------
     InputError : the motion cannot be read, or a setting is not possible
     """
-    from markerscope.solver.commands.synth import make_session
+    from markerscope.solver.io.output_folder import check_output_folder
+    from markerscope.solver.synth.files import check_free, write_session
     from markerscope.solver.synth.session import SynthSettings, synthesise
     from markerscope.solver.synth.source import read_source
 
@@ -244,9 +244,20 @@ def simulate(
         chosen = SynthSettings(**settings)
     except TypeError as error:
         raise InputError(str(error), "simulate", "see SynthSettings for what can be set") from error
+    if seed < 0:
+        raise InputError(f"{seed} is not possible", "seed", "give 0 or a positive whole number")
     if out is not None:
-        make_session(SynthRequest(motion=str(motion), out=Path(out), seed=seed, settings=settings), progress)
-    return synthesise(read_source(str(motion), skeleton=None, rate=None), chosen, seed)
+        check_free(Path(out))
+        check_output_folder(out)
+    progress(0.0, "reading the motion")
+    source = read_source(str(motion), skeleton=None, rate=None)
+    progress(0.2, "drawing the session")
+    session = synthesise(source, chosen, seed)
+    if out is not None:
+        progress(0.8, "writing")
+        write_session(out, session)
+    progress(1.0, "done")
+    return session
 
 
 def _is_session(markers: Markers | FileName) -> bool:
